@@ -1,0 +1,66 @@
+/// What every occupancy map offers: integrate depth images, and hand a view to the planner.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/executive/stage_budget.hpp"
+#include "core/geometry/vector.hpp"
+#include "firmware_if/depth_camera.hpp"
+#include "firmware_if/status.hpp"
+#include "stages/perception/map_view.hpp"
+
+namespace roborun::stages {
+
+/// A depth image and where its camera was at the instant of exposure (as the estimator believes).
+struct PosedDepthFrame {
+  firmware_if::DepthFrame frame{};
+  Pose X_WC{};
+};
+
+struct IntegrationRequest {
+  std::span<const PosedDepthFrame> frames{};
+  int level{0};                              ///< p0: no cell finer than cell_size_m(level) is written.
+  double volume_m3{0.0};                     ///< v0: space nearest to `trajectory_W` first, until this is spent.
+  std::span<const Vector3> trajectory_W{};   ///< Points of the committed trajectory; at least the vehicle itself.
+};
+
+struct IntegrationResult {
+  core::Work work{};               ///< units: cells and nodes visited; volume_m3: space updated.
+  std::uint32_t frames_refused{};  ///< Frames with a wrong size, a non-finite pose or no valid pixel: not used at all.
+};
+
+struct ExportRequest {
+  int level{0};           ///< p1: the view answers for cells of cell_size_m(level).
+  double volume_m3{0.0};  ///< v1: known space nearest to center_W first, until this is spent; unknown beyond.
+  Vector3 center_W = Vector3::Zero();
+};
+
+/// Contract (proved on every implementation by tests/stages/perception/occupancy_map_contract_test.cpp):
+///  1. Space never seen is unknown. A frame that was refused, a NaN pixel and an empty frame change nothing.
+///  2. After one integration at level 0 of a clean frame, the cells that a ray crossed well before its end are free,
+///     and the cell at its end (or a face neighbour) is occupied.
+///  3. A free write at a coarse level never clears a finer cell in which a surface was seen in this scan.
+///  4. Evidence is bounded: what moved away is free again after at most 10 scans that look through it.
+///  5. The same calls in the same order give the same map: digest() is equal, on every machine (own backend).
+class OccupancyMap {
+ public:
+  virtual ~OccupancyMap() = default;
+
+  /// kOk, or kBudgetSpent (budget or volume: the nearest space was integrated), or kInvalidArgument (no usable frame).
+  [[nodiscard]] virtual Status integrate(const IntegrationRequest& request, core::StageBudget& budget,
+                                         IntegrationResult& result) noexcept = 0;
+  /// Makes view() answer for `request`. kOk, or kBudgetSpent (a smaller view), or kInvalidArgument.
+  /// work.units: bricks or nodes visited; work.volume_m3: known space inside the view.
+  [[nodiscard]] virtual Status export_view(const ExportRequest& request, core::StageBudget& budget,
+                                           core::Work& work) noexcept = 0;
+  /// The view of the last export_view(); stays valid until the next integrate().
+  [[nodiscard]] virtual const MapView& view() const noexcept = 0;
+
+  [[nodiscard]] virtual double known_volume_m3() const noexcept = 0;
+  [[nodiscard]] virtual std::size_t bytes() const noexcept = 0;
+  [[nodiscard]] virtual std::uint64_t digest() const noexcept = 0;
+};
+
+}  // namespace roborun::stages
