@@ -21,7 +21,15 @@ struct TrajectoryPoint {
 struct PolynomialSegment {
   static constexpr std::size_t kCoefficients = 10;
   double duration_s{};
-  std::array<Vector3, kCoefficients> coefficient{};
+  std::array<Vector3, kCoefficients> coefficient = zeros();
+
+ private:
+  /// Eigen leaves vectors unset; a trajectory never is.
+  [[nodiscard]] static std::array<Vector3, kCoefficients> zeros() noexcept {
+    std::array<Vector3, kCoefficients> all;
+    all.fill(Vector3::Zero());
+    return all;
+  }
 };
 
 /// Piecewise polynomial, continuous up to snap, at rest at its end. Before start_time it stays at its first point,

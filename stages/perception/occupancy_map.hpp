@@ -38,7 +38,8 @@ struct ExportRequest {
 };
 
 /// Contract (proved on every implementation by tests/stages/perception/occupancy_map_contract_test.cpp):
-///  1. Space never seen is unknown. A frame that was refused, a NaN pixel and an empty frame change nothing.
+///  1. Space never seen is unknown. A frame that was refused and a hole of NaN pixels change nothing (a single lost pixel
+///     among valid neighbours counts as the nearest of them).
 ///  2. After one integration at level 0 of a clean frame, the cells that a ray crossed well before its end are free,
 ///     and the cell at its end (or a face neighbour) is occupied.
 ///  3. A free write at a coarse level never clears a finer cell in which a surface was seen in this scan.

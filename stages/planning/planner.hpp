@@ -12,6 +12,9 @@
 
 namespace roborun::stages {
 
+/// A metre of space that nobody has seen yet counts as this many metres of known path: it may hide a detour.
+inline constexpr double kUnknownWeight = 2.0;
+
 struct PlanRequest {
   Vector3 start_W = Vector3::Zero();
   Vector3 goal_W = Vector3::Zero();  ///< Final goal of the mission; most of the time far outside the known space.
@@ -33,7 +36,7 @@ struct PlanResult {
 /// Contract (proved on every implementation by tests/stages/planning/planner_contract_test.cpp):
 ///  1. Every straight piece of a returned path passes is_segment_free() on the given view. Unknown is not free.
 ///  2. If the goal cannot be reached inside known free space, the path leads to the point of it from which the goal
-///     promises to be nearest (least path length plus remaining straight distance).
+///     promises to be nearest: least path length plus kUnknownWeight times the remaining straight distance.
 ///  3. kStartBlocked, kGoalBlocked (goal occupied or out of bounds, with the path to the nearest point if there is
 ///     one), kNoPath (nothing better than the start), kInvalidArgument (not finite, empty bounds) are answers, not
 ///     errors; kBudgetSpent comes with the best path so far.

@@ -1,0 +1,56 @@
+/// How long a stage takes at a precision and volume. Source: RoboRun Eq. 4, with a constant added.
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "core/executive/cost_profile.hpp"
+#include "core/precision.hpp"
+
+namespace roborun::governor {
+
+/// latency(level, v) = fixed_s[level] + slope_s_per_m3[level] v. Linear in the volume at each precision, as Eq. 4 is;
+/// Eq. 4 itself is one way to fill the slopes. Non-negative everywhere.
+struct LatencyModel {
+  std::array<double, kPrecisionLevels> fixed_s{};
+  std::array<double, kPrecisionLevels> slope_s_per_m3{};
+
+  [[nodiscard]] double latency_s(int level, double volume_m3) const noexcept;
+};
+
+/// Eq. 4: (q0 / p^3 + q1 / p^2 + q2 / p) (q3 v) + constant. Negative results are raised to 0.
+struct Eq4 {
+  std::array<double, 4> q{};
+  double constant_s{};
+};
+[[nodiscard]] LatencyModel from_eq4(const Eq4& eq4) noexcept;
+/// The part of a cost profile that depends on level and volume.
+[[nodiscard]] LatencyModel from_cost(const core::StageCost& cost) noexcept;
+
+/// One measured point of a precision x volume sweep.
+struct LatencyPoint {
+  int level{};
+  double volume_m3{};
+  double latency_s{};
+};
+struct Eq4Fit {
+  Eq4 eq4{};
+  double mean_relative_error{};
+  double max_relative_error{};
+};
+/// Least squares of the relative error with all coefficients >= 0 (so that the model is monotone), q3 = 1, by trying the
+/// 16 sets of active coefficients. Points with latency <= 0 are left out. Start-up only: O(16 * points).
+[[nodiscard]] Eq4Fit fit_eq4(std::span<const LatencyPoint> points) noexcept;
+
+/// Follows a machine that became slower than its model: predicted times are multiplied by it. Rises at once to what was
+/// seen, falls by 2 % a decision; always within [1, 4].
+class DriftScale {
+ public:
+  void observe(double predicted_s, double spent_s) noexcept;
+  [[nodiscard]] double value() const noexcept { return value_; }
+
+ private:
+  double value_{1.0};
+};
+
+}  // namespace roborun::governor

@@ -1,0 +1,23 @@
+/// How far the vehicle travels until it stands. Source: RoboRun Eq. 2 (printed there with the wrong sign).
+#pragma once
+
+namespace roborun::governor {
+
+/// d_stop(v) = quadratic v^2 + linear v + constant, at least 0.
+struct StoppingModel {
+  double quadratic_s2pm{};
+  double linear_s{};
+  double constant_m{};
+
+  /// 0 for a negative speed; NaN gives +infinity: an unknown speed never stops. RT-safe: O(1).
+  [[nodiscard]] double distance_m(double speed_mps) const noexcept;
+};
+
+/// The authors' simulated drone, fitted on (v m/s, m): (0.995, 0.266) (1.975, 0.598) (3.921, 2.162) (5.834, 3.539)
+/// (7.712, 5.985) (9.563, 8.151). Relative mean squared error 1.65 %.
+inline constexpr StoppingModel kRoborunStopping{0.05494, 0.3549, -0.2038};
+
+/// The quadrotor of platform/sitl braking along a smoothed trajectory. See tests/platform/sitl/vehicle/stopping_test.cpp.
+inline constexpr StoppingModel kSitlQuadrotorStopping{0.155, 0.45, 0.05};
+
+}  // namespace roborun::governor

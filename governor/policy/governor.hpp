@@ -1,0 +1,102 @@
+/// Turns what the stages observed into what they may spend: time budget, operating point, speed limit, one decision at a
+/// time. Source: RoboRun section "Governor".
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/executive/cost_profile.hpp"
+#include "core/operating_point.hpp"
+#include "core/space_profile.hpp"
+#include "governor/budget/time_budget.hpp"
+#include "governor/models/latency_model.hpp"
+#include "governor/solver/lattice_solver.hpp"
+
+namespace roborun::governor {
+
+/// The three designs that are compared.
+enum class Design : std::uint8_t {
+  kAware,       ///< Everything is set anew at every decision.
+  kStatic,      ///< The published baseline: 0.3 m, 46,000 / 150,000 / 150,000 m3, 0.5 m/s.
+  kStaticFair,  ///< The same knobs; its speed comes from the same safety formula as the aware design's.
+};
+[[nodiscard]] const char* to_string(Design design) noexcept;
+
+/// What set the time budget.
+enum class BudgetSource : std::uint8_t { kTrajectory, kVisibility, kShortest, kLongest, kFailures, kFixed };
+[[nodiscard]] const char* to_string(BudgetSource source) noexcept;
+
+/// The extra rules beyond Eq. 3, one row each.
+struct Policy {
+  /// A frame taken at t0 gives a trajectory that takes over at t0 + T and must last until its successor does, at t0 + 2 T:
+  /// hence T = budget / 2. (The authors' code has the factor, without the reason.)
+  double decisions_per_budget{2.0};
+  Nanos shortest{200'000'000};            ///< No decision shorter than this.
+  Nanos longest{800'000'000};             ///< More thinking than this makes flight slower, not better.
+  Nanos longest_after_failures{6'000'000'000};  ///< ... unless the planner keeps failing: then up to the true budget.
+  int failures_until_finer{2};            ///< From this many failed decisions on, one level finer for each.
+  int coarser_levels_per_decision{1};     ///< Precision is lost slowly and won at once.
+  double near_goal_m{8.0};                ///< Nearer than this: at most 0.6 m cells ...
+  double near_goal_speed_mps{2.5};        ///< ... and this speed.
+  double reserve_ratio{0.06};             ///< Share of the deadline that is not planned for.
+  double slowest_mps{0.5};                ///< No speed limit below this: each trajectory ends in a stop anyway.
+};
+
+struct GovernorConfig {
+  Design design{Design::kAware};
+  Policy policy{};
+  StoppingModel stopping{kSitlQuadrotorStopping};
+  std::array<LatencyModel, 3> model{};  ///< Map, export, planner.
+  double point_cloud_s{};               ///< Fixed costs of the other stages.
+  double governor_s{};                  ///< 0 for the static designs: they have none.
+  double smoother_s{};
+  double v_max_mps{6.0};                ///< RoboRun Table "Knob values"; the static design's is 0.5.
+  double vehicle_width_m{1.2};
+  double sensor_volume_max_m3{60e3};    ///< The most that the cameras can see between the height limits.
+  int coarsest_level{3};                ///< Cells must fit several times into the flight band.
+  double design_visibility_m{10.0};     ///< static-fair: the worst visibility of the congested zones (authors: 8 to 10 m).
+  Nanos minor_frame{2'500'000};
+};
+
+struct Situation {
+  int failures{};            ///< Decisions in a row without a new trajectory.
+  double distance_to_goal_m{};
+};
+
+/// What was decided, and why.
+struct Decision {
+  OperatingPoint point{};
+  Nanos time_budget{};                      ///< Before the policy.
+  BudgetSource source{};
+  SolverProblem problem{};
+  SolverSolution solution{};
+  std::array<double, core::kStageCount> predicted_s{};
+  double demand_m{};                        ///< Coarsest cell that the space allows: min((g_avg - width) / 2, d_obs).
+};
+
+/// One instance a vehicle. RT-safe: O(1), no allocation.
+class Governor {
+ public:
+  explicit Governor(const GovernorConfig& config) noexcept;
+
+  [[nodiscard]] Decision decide(const SpaceProfile& profile, const Situation& situation) noexcept;
+  /// What a stage really took, so that the model follows a machine that slows down.
+  void observe(core::StageId id, double predicted_s, double spent_s) noexcept;
+  /// Largest v with (visible - d_stop(v)) / (decisions_per_budget * v) >= latency; 0 if none. Closed form.
+  [[nodiscard]] double safe_speed_mps(double visible_m, double latency_s) const noexcept;
+  /// Speed limit of the static designs; the aware design's upper bound.
+  [[nodiscard]] double v_max_mps() const noexcept { return v_max_mps_; }
+
+ private:
+  [[nodiscard]] Decision decide_static(const SpaceProfile& profile) const noexcept;
+  [[nodiscard]] double predicted_s(int stage, int level, double volume_m3) const noexcept;
+  void fill_prediction(Decision& decision) const noexcept;
+  [[nodiscard]] Nanos whole_frames(double time_s) const noexcept;
+
+  GovernorConfig config_;
+  std::array<DriftScale, 3> scale_{};
+  double v_max_mps_{};
+  int last_level_{kPrecisionLevels - 1};
+};
+
+}  // namespace roborun::governor

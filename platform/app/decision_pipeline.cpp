@@ -1,0 +1,131 @@
+#include "platform/app/decision_pipeline.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/memory/static_vector.hpp"
+
+namespace roborun::app {
+namespace {
+
+constexpr std::size_t index(core::StageId id) noexcept { return static_cast<std::size_t>(id); }
+constexpr double kTrajectoryStep_s = 0.5;  // of the points that order the space by distance
+constexpr std::size_t kTrajectoryPoints = 32;
+
+}  // namespace
+
+DecisionPipeline::DecisionPipeline(const PipelineConfig& config, const core::CostProfile& costs, governor::Governor& governor,
+                                   stages::PointCloud& cloud, stages::OccupancyMap& map, stages::Planner& planner,
+                                   stages::Smoother& smoother) noexcept
+    : config_(config), costs_(costs), governor_(governor), cloud_(cloud), map_(map), planner_(planner), smoother_(smoother) {
+  cloud_.set_height_limits(config.map_bounds_W.min_W.z(), config.map_bounds_W.max_W.z());
+}
+
+void DecisionPipeline::charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept {
+  out.work[index(id)] = work;
+  out.cost[index(id)] = costs_.cost(id, work);
+  out.latency += out.cost[index(id)];
+  governor_.observe(id, out.decision.predicted_s[index(id)], seconds(out.cost[index(id)]));
+}
+
+core::VirtualBudget DecisionPipeline::budget_of(core::StageId id, const DecisionOutput& out) const noexcept {
+  Nanos rest = out.decision.point.deadline - out.latency;
+  for (std::size_t later = index(id) + 1; later < core::kStageCount; ++later) rest -= from_seconds(out.decision.predicted_s[later]);
+  return {costs_, id, rest};
+}
+
+void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) noexcept {
+  core::UnlimitedBudget unlimited;
+  core::Work work;
+  (void)cloud_.step(in.frames, 0, unlimited, work);
+  const double r_m = radius_m();
+  const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m), config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
+  profile_space({}, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W, relevant_W, r_m, out.profile, work.units);
+  out.profile.sensor_volume_m3 = cloud_.seen_volume_m3();
+  // What the map will hold once this decision's images are in it.
+  out.profile.map_volume_m3 = map_.known_volume_m3() + cloud_.seen_volume_m3();
+  charge(core::StageId::kPointCloud, work, out);
+
+  out.decision = governor_.decide(out.profile, {failures_, (in.goal_W - in.p_WB).norm()});
+  if (out.decision.predicted_s[index(core::StageId::kGovernor)] > 0.0) charge(core::StageId::kGovernor, {}, out);
+
+  core::StaticVector<Vector3, kTrajectoryPoints> trajectory_W;
+  (void)trajectory_W.push_back(in.p_WB);
+  const double begin_s = seconds(in.now - in.committed->start_time);
+  for (double ahead_s = kTrajectoryStep_s; ahead_s < in.committed->duration_s() - begin_s; ahead_s += kTrajectoryStep_s) {
+    if (!trajectory_W.push_back(in.committed->at_s(begin_s + ahead_s).p_W)) break;
+  }
+  const OperatingPoint& point = out.decision.point;
+  core::VirtualBudget map_budget = budget_of(core::StageId::kMap, out);
+  stages::IntegrationResult integrated;
+  (void)map_.integrate({in.frames, point.p0_level, point.v0_m3, {trajectory_W.begin(), trajectory_W.size()}}, map_budget, integrated);
+  charge(core::StageId::kMap, integrated.work, out);
+
+  core::VirtualBudget export_budget = budget_of(core::StageId::kExport, out);
+  core::Work exported;
+  (void)map_.export_view({point.p1_level, point.v1_m3, in.p_WB}, export_budget, exported);
+  charge(core::StageId::kExport, exported, out);
+}
+
+void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexcept {
+  const stages::MapView& view = map_.view();
+  const OperatingPoint& point = out.decision.point;
+  const MonotonicTime takes_over = in.now + point.deadline;
+  const TrajectoryPoint start = in.committed->at(takes_over);
+  const double r_m = radius_m();
+
+  // Is what we fly still free? If not, the stop takes over as soon as it can.
+  std::uint64_t check_lookups = 0;
+  const double from_s = seconds(in.now - in.committed->start_time);
+  const bool committed_free = is_trajectory_free(view, *in.committed, from_s, config_.vehicle_radius_m, check_lookups);
+
+  stages::PlanRequest request;
+  request.start_W = start.p_W;
+  request.goal_W = in.goal_W;
+  request.bounds_W = config_.flight_bounds_W;
+  request.radius_m = r_m;
+  request.volume_m3 = point.v2_m3;
+  request.horizon_m = config_.horizon_m;
+  request.seed = in.seed;
+  core::VirtualBudget planner_budget = budget_of(core::StageId::kPlanner, out);
+  stages::PlanResult planned;
+  out.planner_status = planner_.plan(request, view, planner_budget, planned);
+  planned.work.level = point.p1_level;
+  planned.work.units += check_lookups;
+  charge(core::StageId::kPlanner, planned.work, out);
+  out.planned_to_goal = planned.reaches_goal;
+
+  stages::SmoothResult smoothed;
+  if (planned.path_W.size() >= 2) {
+    stages::SmoothRequest smooth;
+    smooth.path_W = {planned.path_W.begin(), planned.path_W.size()};
+    smooth.start = start;
+    smooth.start_time = takes_over;
+    smooth.limits = {point.speed_limit_mps, config_.acceleration_mps2};
+    smooth.radius_m = out.planner_status == Status::kStartBlocked ? config_.vehicle_radius_m : r_m;
+    core::VirtualBudget smoother_budget = budget_of(core::StageId::kSmoother, out);
+    out.smoother_status = smoother_.smooth(smooth, view, smoother_budget, smoothed);
+  }
+  charge(core::StageId::kSmoother, smoothed.work, out);
+
+  if (out.smoother_status == Status::kOk) {
+    out.kind = DecisionKind::kNew;
+    out.trajectory = smoothed.trajectory;
+  } else if (!committed_free) {
+    const MonotonicTime soonest = in.now + out.latency + Nanos{2'500'000};
+    const TrajectoryPoint then = in.committed->at(soonest);
+    if (then.v_W.norm() > 0.05 &&
+        smoother_.brake(then, soonest, {config_.acceleration_mps2, config_.acceleration_mps2}, out.trajectory) == Status::kOk) {
+      out.kind = DecisionKind::kBrake;
+    }
+  }
+}
+
+void DecisionPipeline::decide(const DecisionInput& in, DecisionOutput& out) noexcept {
+  out = {};
+  perceive(in, out);
+  plan(in, out);
+  failures_ = out.kind == DecisionKind::kNew ? 0 : failures_ + 1;
+}
+
+}  // namespace roborun::app

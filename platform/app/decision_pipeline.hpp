@@ -1,0 +1,90 @@
+/// One decision: depth images in, a committed trajectory out. The only place where governor and stages meet.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "core/executive/cost_profile.hpp"
+#include "core/executive/stage_budget.hpp"
+#include "core/geometry/vector.hpp"
+#include "core/trajectory.hpp"
+#include "governor/policy/governor.hpp"
+#include "stages/perception/occupancy_map.hpp"
+#include "stages/perception/point_cloud.hpp"
+#include "stages/perception/space_profiler.hpp"
+#include "stages/planning/planner.hpp"
+#include "stages/planning/smoother.hpp"
+
+namespace roborun::app {
+
+struct PipelineConfig {
+  Aabb flight_bounds_W{};        ///< The vehicle's centre stays inside.
+  double vehicle_radius_m{0.6};  ///< Half of the 1.2 m span. [0.1, 2]
+  /// Added to the radius for planning: the tracking error (tests/platform/sitl/vehicle/closed_loop_test.cpp).
+  double inflation_m{0.3};
+  double horizon_m{24.0};  ///< No way-point farther than this: one metre less than the cameras see.
+  double acceleration_mps2{4.0};
+  Aabb map_bounds_W{};           ///< What the map stores; its heights limit what counts as seen volume.
+};
+
+struct DecisionInput {
+  MonotonicTime now{};  ///< Start of the decision.
+  std::span<const stages::PosedDepthFrame> frames{};
+  const Trajectory* committed{};  ///< What the flight lane flies now.
+  Vector3 p_WB = Vector3::Zero();
+  Vector3 v_WB = Vector3::Zero();
+  Vector3 goal_W = Vector3::Zero();
+  std::uint64_t seed{};
+};
+
+/// What the flight lane is to do with the result.
+enum class DecisionKind : std::uint8_t {
+  kKeep,   ///< Nothing better: fly on, the committed trajectory ends in a stop.
+  kNew,    ///< `trajectory` takes over at its start time.
+  kBrake,  ///< The committed trajectory is no longer free: `trajectory` is the stop.
+};
+
+struct DecisionOutput {
+  DecisionKind kind{DecisionKind::kKeep};
+  Trajectory trajectory{};
+  Status planner_status{Status::kNotReady};
+  Status smoother_status{Status::kNotReady};
+  bool planned_to_goal{};  ///< The path ends at the goal of the mission.
+  SpaceProfile profile{};
+  governor::Decision decision{};
+  std::array<core::Work, core::kStageCount> work{};
+  std::array<Nanos, core::kStageCount> cost{};
+  Nanos latency{};  ///< Sum of the costs: when the result is there, counted from input.now.
+};
+
+/// Runs the stages in the order of the frame table below, each under the budget that the governor granted it.
+/// Memory: everything is taken from the arena at construction. One thread.
+class DecisionPipeline {
+ public:
+  /// The map and the planner are given from outside, so that any backend flies with any design.
+  DecisionPipeline(const PipelineConfig& config, const core::CostProfile& costs, governor::Governor& governor,
+                   stages::PointCloud& cloud, stages::OccupancyMap& map, stages::Planner& planner,
+                   stages::Smoother& smoother) noexcept;
+
+  void decide(const DecisionInput& in, DecisionOutput& out) noexcept;
+
+ private:
+  void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
+  void perceive(const DecisionInput& in, DecisionOutput& out) noexcept;
+  void plan(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// What is left of the deadline for this stage, when the stages after it get what was predicted for them.
+  [[nodiscard]] core::VirtualBudget budget_of(core::StageId id, const DecisionOutput& out) const noexcept;
+  [[nodiscard]] double radius_m() const noexcept { return config_.vehicle_radius_m + config_.inflation_m; }
+
+  PipelineConfig config_;
+  const core::CostProfile& costs_;
+  governor::Governor& governor_;
+  stages::PointCloud& cloud_;
+  stages::OccupancyMap& map_;
+  stages::Planner& planner_;
+  stages::Smoother& smoother_;
+  int failures_{0};  ///< Decisions in a row without a new trajectory.
+};
+
+}  // namespace roborun::app

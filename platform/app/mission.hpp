@@ -1,0 +1,48 @@
+/// A whole mission in lockstep virtual time: world, vehicle, sensors, flight lane and decision lane.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "core/executive/cost_profile.hpp"
+#include "governor/policy/governor.hpp"
+#include "platform/report/mission_result.hpp"
+#include "platform/sitl/sensors/depth_camera.hpp"
+#include "platform/sitl/sensors/navigation_sensors.hpp"
+#include "platform/sitl/vehicle/vehicle.hpp"
+#include "platform/sitl/world/world.hpp"
+
+namespace roborun::app {
+
+struct MissionConfig {
+  governor::Design design{governor::Design::kAware};
+  std::string profile_name{"paper"};
+  core::CostProfile costs{};
+  std::array<governor::LatencyModel, 3> model{};
+  std::uint64_t seed{1};
+  std::string map_backend{"own"};      ///< "own" or "octomap".
+  std::string planner_backend{"own"};  ///< "own" or "ompl:NAME".
+  double v_max_mps{6.0};
+  sitl::DepthCameraConfig camera{};
+  sitl::NavigationSensorsConfig sensors{};
+  sitl::VehicleConfig vehicle{};
+  sitl::WindConfig wind{};
+  double time_limit_s{7200.0};
+  double no_progress_s{120.0};  ///< Not nearer to the goal for so long: the mission is given up, hovering.
+};
+
+struct Progress {
+  double time_s{};
+  double done_ratio{};
+  double speed_mps{};
+};
+
+/// Flies from the world's start (on the ground) to its goal. Deterministic: the same config, world and build give the same
+/// report, but for real_time_factor. `progress` (may be empty) is called about once a second of virtual time.
+/// result.env, mission and profile are left to the caller. Throws sitl::InputError for an unknown backend.
+[[nodiscard]] report::MissionReport fly_mission(const sitl::World& world, const MissionConfig& config,
+                                                const std::function<void(const Progress&)>& progress);
+
+}  // namespace roborun::app

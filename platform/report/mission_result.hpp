@@ -1,0 +1,91 @@
+/// What a mission was: the fields of `roborun fly --json`, and the records behind them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/executive/stage_budget.hpp"
+#include "core/geometry/vector.hpp"
+
+namespace roborun::report {
+
+struct LatencySummary {
+  double median{}, p99{}, max{};
+};
+struct PrecisionSummary {
+  double min{}, median{}, max{};
+};
+
+/// Names and order are those of the JSON object.
+struct MissionResult {
+  std::string design;
+  std::string profile;
+  std::string env;
+  std::uint64_t seed{};
+  bool reached_goal{};
+  bool collided{};
+  double mission_time_s{};
+  double distance_m{};
+  double mean_velocity_mps{};
+  double max_velocity_mps{};
+  double energy_kJ{};
+  std::uint64_t decisions{};
+  std::uint64_t deadline_misses{};
+  LatencySummary latency_s{};
+  double cpu_s{};
+  double cpu_utilization_ratio{};
+  PrecisionSummary precision_m{};
+  double real_time_factor{};
+  std::uint64_t map_bytes{};
+  std::string state_hash;  ///< 16 hexadecimal digits.
+  std::string map;
+  std::string planner;
+  std::string mission;
+  std::string reason;      ///< Why the mission ended.
+  double speed_limit_mps{};  ///< v_max of the design.
+};
+
+/// One decision, for traces and plots.
+struct DecisionRecord {
+  double time_s{};
+  Vector3 p_WB = Vector3::Zero();
+  double speed_mps{};
+  double p0_m{};
+  double p1_m{};
+  double v0_m3{};
+  double v1_m3{};
+  double v2_m3{};
+  double time_budget_s{};
+  std::string budget_source;
+  double deadline_s{};
+  double latency_s{};
+  std::array<double, core::kStageCount> stage_s{};
+  double speed_limit_mps{};
+  double visible_m{};
+  double closest_obstacle_m{};
+  double gap_average_m{};
+  double sensor_volume_m3{};
+  double map_volume_m3{};
+  std::string planner_status;
+  std::string smoother_status;
+  bool missed{};
+};
+
+struct PathPoint {
+  double time_s{};
+  Vector3 p_WB = Vector3::Zero();
+  double speed_mps{};
+};
+
+struct MissionReport {
+  MissionResult result;
+  std::vector<DecisionRecord> decisions;
+  std::vector<PathPoint> path;  ///< At 10 Hz.
+};
+
+/// One line. Numbers that are not finite become null.
+[[nodiscard]] std::string to_json(const MissionResult& result);
+
+}  // namespace roborun::report

@@ -1,0 +1,89 @@
+#include "platform/sitl/sensors/depth_camera.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "core/random/counter_rng.hpp"
+
+namespace roborun::sitl {
+
+SimulatedDepthCamera::SimulatedDepthCamera(const World& world, const DepthCameraConfig& config,
+                                           const firmware_if::CameraMount& mount, std::uint64_t seed, std::uint32_t camera)
+    : world_(world), config_(config), mount_(mount), seed_(seed), camera_(camera) {
+  const std::size_t n = config.pixels;
+  image_.resize(n * n);
+  ray_C_.reserve(n * n);
+  for (std::size_t v = 0; v < n; ++v) {
+    for (std::size_t u = 0; u < n; ++u) {
+      const double t = config.tan_half_fov_ratio;
+      const double y = -(2.0 * (static_cast<double>(u) + 0.5) / static_cast<double>(n) - 1.0) * t;
+      const double z = -(2.0 * (static_cast<double>(v) + 0.5) / static_cast<double>(n) - 1.0) * t;
+      ray_C_.emplace_back(1.0, y, z);
+    }
+  }
+}
+
+void SimulatedDepthCamera::expose(MonotonicTime now, const Pose& X_WB) noexcept {
+  now_ = now;
+  if (now < next_) return;
+  next_ = now + from_seconds(1.0 / config_.rate_Hz);
+  ++taken_;
+  Exposure& e = ring_[taken_ % ring_.size()];
+  e.stamp = now;
+  e.sequence = taken_;
+  Matrix3 R_BC;
+  Vector3 p_BC;
+  for (int i = 0; i < 9; ++i) R_BC(i / 3, i % 3) = mount_.R_BC[static_cast<std::size_t>(i)];
+  for (int i = 0; i < 3; ++i) p_BC[i] = mount_.p_BC_m[static_cast<std::size_t>(i)];
+  e.X_WC = {X_WB.R_RT * R_BC, X_WB * p_BC};
+  core::CounterRng rng(seed_, 0x1000U + camera_);
+  rng.seek(std::uint64_t{taken_});
+  e.lost = rng.uniform() < config_.frame_dropout_ratio;
+}
+
+Status SimulatedDepthCamera::read(firmware_if::DepthFrame& frame) noexcept {
+  const Nanos latency = from_seconds(config_.latency_s);
+  for (std::uint32_t sequence = taken_; sequence > last_read_ && taken_ - sequence < ring_.size(); --sequence) {
+    const Exposure& e = ring_[sequence % ring_.size()];
+    if (e.lost || e.stamp + latency > now_) continue;
+    render(e);
+    last_read_ = sequence;
+    frame = {e.stamp, e.sequence, config_.pixels, config_.pixels, static_cast<float>(config_.tan_half_fov_ratio),
+             static_cast<float>(config_.range_m), image_};
+    return Status::kOk;
+  }
+  return Status::kNotReady;
+}
+
+void SimulatedDepthCamera::render(const Exposure& e) noexcept {
+  core::CounterRng rng(seed_, (std::uint64_t{camera_} << 40U) + e.sequence);
+  const Vector3 origin_W = e.X_WC.p_RT;
+  for (std::size_t i = 0; i < ray_C_.size(); ++i) {
+    const double length = ray_C_[i].norm();
+    const Vector3 direction_W = (e.X_WC.R_RT * ray_C_[i]) / length;
+    double depth_m = world_.hit_distance_m(origin_W, direction_W, config_.range_m * length) / length;
+    const std::uint64_t bits = rng.next();
+    if (static_cast<double>(bits >> 40U) * 0x1.0p-24 < config_.pixel_dropout_ratio) {
+      depth_m = std::numeric_limits<double>::quiet_NaN();
+    } else if (depth_m < std::numeric_limits<double>::infinity()) {
+      // Sum of four 10-bit uniforms: near enough to a Gaussian, and bounded, as a matcher's error is.
+      const double sum = static_cast<double>((bits & 1023U) + ((bits >> 10U) & 1023U) + ((bits >> 20U) & 1023U) +
+                                             ((bits >> 30U) & 1023U));
+      const double standard = (sum - 2046.0) / 591.2;
+      depth_m = std::fmax(0.01, depth_m + standard * (config_.noise_m + config_.noise_per_m * depth_m * depth_m));
+    }
+    image_[i] = static_cast<float>(depth_m);
+  }
+}
+
+std::array<firmware_if::CameraMount, 6> six_camera_mounts() noexcept {
+  // Columns of R_BC are the camera's x (optical axis), y (left), z (up) in the body frame.
+  return {{{{1, 0, 0, 0, 1, 0, 0, 0, 1}, {}},
+           {{0, -1, 0, 1, 0, 0, 0, 0, 1}, {}},
+           {{-1, 0, 0, 0, -1, 0, 0, 0, 1}, {}},
+           {{0, 1, 0, -1, 0, 0, 0, 0, 1}, {}},
+           {{0, 0, -1, 0, 1, 0, 1, 0, 0}, {}},
+           {{0, 0, 1, 0, 1, 0, -1, 0, 0}, {}}}};
+}
+
+}  // namespace roborun::sitl

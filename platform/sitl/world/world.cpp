@@ -1,0 +1,210 @@
+#include "platform/sitl/world/world.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/geometry/math.hpp"
+#include "platform/sitl/world/input_error.hpp"
+
+namespace roborun::sitl {
+namespace {
+
+constexpr double kColumn_m = 5.0;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+double hit_pillar_m(const Pillar& pillar, const Vector3& o, const Vector3& d) noexcept {
+  const double ox = o.x() - pillar.x_m;
+  const double oy = o.y() - pillar.y_m;
+  const double a = d.x() * d.x() + d.y() * d.y();
+  const double b = ox * d.x() + oy * d.y();
+  const double c = ox * ox + oy * oy - pillar.radius_m * pillar.radius_m;
+  double enter_m = -kInfinity;
+  double leave_m = kInfinity;
+  if (a > 0.0) {
+    const double discriminant = b * b - a * c;
+    if (discriminant < 0.0) return kInfinity;
+    const double root = std::sqrt(discriminant);
+    enter_m = (-b - root) / a;
+    leave_m = (-b + root) / a;
+  } else if (c > 0.0) {
+    return kInfinity;
+  }
+  if (d.z() != 0.0) {
+    const double t0 = (pillar.bottom_m - o.z()) / d.z();
+    const double t1 = (pillar.top_m - o.z()) / d.z();
+    enter_m = std::max(enter_m, std::min(t0, t1));
+    leave_m = std::min(leave_m, std::max(t0, t1));
+  } else if (o.z() < pillar.bottom_m || o.z() > pillar.top_m) {
+    return kInfinity;
+  }
+  if (enter_m > leave_m || leave_m < 0.0) return kInfinity;
+  return std::max(enter_m, 0.0);
+}
+
+double hit_box_m(const Aabb& box, const Vector3& o, const Vector3& d) noexcept {
+  double enter_m = 0.0;
+  double leave_m = kInfinity;
+  for (int i = 0; i < 3; ++i) {
+    if (d[i] == 0.0) {
+      if (o[i] < box.min_W[i] || o[i] > box.max_W[i]) return kInfinity;
+      continue;
+    }
+    const double t0 = (box.min_W[i] - o[i]) / d[i];
+    const double t1 = (box.max_W[i] - o[i]) / d[i];
+    enter_m = std::max(enter_m, std::min(t0, t1));
+    leave_m = std::min(leave_m, std::max(t0, t1));
+  }
+  return enter_m > leave_m ? kInfinity : enter_m;
+}
+
+double pillar_distance_m(const Pillar& pillar, const Vector3& p) noexcept {
+  const double side_m = std::max(core::hypot2(p.x() - pillar.x_m, p.y() - pillar.y_m) - pillar.radius_m, 0.0);
+  const double height_m = std::max({pillar.bottom_m - p.z(), p.z() - pillar.top_m, 0.0});
+  return core::hypot2(side_m, height_m);
+}
+
+double box_distance_m(const Aabb& box, const Vector3& p) noexcept {
+  return (p - p.cwiseMax(box.min_W).cwiseMin(box.max_W)).norm();
+}
+
+Aabb extent_of(const Pillar& p) noexcept {
+  return {Vector3(p.x_m - p.radius_m, p.y_m - p.radius_m, p.bottom_m),
+          Vector3(p.x_m + p.radius_m, p.y_m + p.radius_m, p.top_m)};
+}
+
+}  // namespace
+
+World::World(WorldDescription description) : description_(std::move(description)) {
+  const Aabb& b = description_.bounds_W;
+  if (!is_finite(b.min_W) || !is_finite(b.max_W) || !(b.size().minCoeff() > 0.0) || b.size().maxCoeff() > 20e3) {
+    throw InputError("world: bounds must be finite, with min < max on every axis and at most 20 km a side");
+  }
+  for (const auto& [name, p] : {std::pair{"start", description_.start_W}, std::pair{"goal", description_.goal_W}}) {
+    if (!is_finite(p) || !b.contains(p)) {
+      throw InputError(fmt::format("world: {} ({}, {}, {}) is outside the bounds x {}..{}, y {}..{}, z {}..{} m", name, p.x(),
+                                   p.y(), p.z(), b.min_W.x(), b.max_W.x(), b.min_W.y(), b.max_W.y(), b.min_W.z(), b.max_W.z()));
+    }
+  }
+
+  std::vector<Aabb> extents;
+  for (const Pillar& pillar : description_.pillars) extents.push_back(extent_of(pillar));
+  extents.insert(extents.end(), description_.boxes.begin(), description_.boxes.end());
+
+  // One column more on each side, so that a ray that starts at the border meets a square.
+  grid_min_W_ = b.min_W - Vector3::Constant(kColumn_m);
+  nx_ = static_cast<std::int64_t>(b.size().x() / kColumn_m) + 3;
+  ny_ = static_cast<std::int64_t>(b.size().y() / kColumn_m) + 3;
+  std::vector<std::vector<std::uint32_t>> columns(static_cast<std::size_t>(nx_ * ny_));
+  for (std::size_t i = 0; i < extents.size(); ++i) {
+    const auto clamp_index = [](double raw, std::int64_t count) {
+      return static_cast<std::int64_t>(std::clamp(std::floor(raw), 0.0, static_cast<double>(count - 1)));
+    };
+    const std::int64_t x0 = clamp_index((extents[i].min_W.x() - grid_min_W_.x()) / kColumn_m, nx_);
+    const std::int64_t x1 = clamp_index((extents[i].max_W.x() - grid_min_W_.x()) / kColumn_m, nx_);
+    const std::int64_t y0 = clamp_index((extents[i].min_W.y() - grid_min_W_.y()) / kColumn_m, ny_);
+    const std::int64_t y1 = clamp_index((extents[i].max_W.y() - grid_min_W_.y()) / kColumn_m, ny_);
+    for (std::int64_t y = y0; y <= y1; ++y) {
+      for (std::int64_t x = x0; x <= x1; ++x) columns[column(x, y)].push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+  for (const auto& list : columns) {
+    column_.push_back({static_cast<std::uint32_t>(object_.size()), static_cast<std::uint32_t>(list.size())});
+    object_.insert(object_.end(), list.begin(), list.end());
+  }
+}
+
+std::size_t World::column(std::int64_t ix, std::int64_t iy) const noexcept {
+  return static_cast<std::size_t>(iy * nx_ + ix);
+}
+
+double World::hit_object_m(std::uint32_t object, const Vector3& origin_W, const Vector3& direction_W) const noexcept {
+  const std::size_t pillar_count = description_.pillars.size();
+  return object < pillar_count ? hit_pillar_m(description_.pillars[object], origin_W, direction_W)
+                               : hit_box_m(description_.boxes[object - pillar_count], origin_W, direction_W);
+}
+
+double World::hit_distance_m(const Vector3& origin_W, const Vector3& direction_W, double max_m) const noexcept {
+  double best_m = description_.voxels.hit_distance_m(origin_W, direction_W, max_m);
+  if (direction_W.z() < 0.0) best_m = std::min(best_m, std::max(origin_W.z(), 0.0) / -direction_W.z());
+  best_m = std::min(best_m, max_m);
+  bool hit = best_m < max_m;
+
+  const double gx = (origin_W.x() - grid_min_W_.x()) / kColumn_m;
+  const double gy = (origin_W.y() - grid_min_W_.y()) / kColumn_m;
+  auto ix = static_cast<std::int64_t>(std::clamp(std::floor(gx), -1.0, static_cast<double>(nx_)));
+  auto iy = static_cast<std::int64_t>(std::clamp(std::floor(gy), -1.0, static_cast<double>(ny_)));
+  const double dx = direction_W.x() / kColumn_m;
+  const double dy = direction_W.y() / kColumn_m;
+  const std::int64_t sx = dx > 0.0 ? 1 : -1;
+  const std::int64_t sy = dy > 0.0 ? 1 : -1;
+  const double step_x_m = dx == 0.0 ? kInfinity : 1.0 / std::fabs(dx);
+  const double step_y_m = dy == 0.0 ? kInfinity : 1.0 / std::fabs(dy);
+  double next_x_m = dx == 0.0 ? kInfinity : (static_cast<double>(ix + (sx > 0 ? 1 : 0)) - gx) / dx;
+  double next_y_m = dy == 0.0 ? kInfinity : (static_cast<double>(iy + (sy > 0 ? 1 : 0)) - gy) / dy;
+  double at_m = 0.0;
+  while (at_m <= best_m && ix >= 0 && iy >= 0 && ix < nx_ && iy < ny_) {
+    const Range range = column_[column(ix, iy)];
+    for (std::uint32_t i = range.first; i < range.first + range.count; ++i) {
+      const double distance_m = hit_object_m(object_[i], origin_W, direction_W);
+      if (distance_m <= best_m) {
+        best_m = distance_m;
+        hit = true;
+      }
+    }
+    if (next_x_m < next_y_m) {
+      at_m = next_x_m;
+      next_x_m += step_x_m;
+      ix += sx;
+    } else {
+      at_m = next_y_m;
+      if (at_m == kInfinity) break;  // straight up or down: one column is all there is
+      next_y_m += step_y_m;
+      iy += sy;
+    }
+  }
+  return hit ? best_m : kInfinity;
+}
+
+double World::clearance_m(const Vector3& p_W, double cap_m) const noexcept {
+  double best_m = description_.voxels.clearance_m(p_W, cap_m);
+  const auto index = [](double raw, std::int64_t count) {
+    return static_cast<std::int64_t>(std::clamp(std::floor(raw), 0.0, static_cast<double>(count - 1)));
+  };
+  const std::int64_t x0 = index((p_W.x() - cap_m - grid_min_W_.x()) / kColumn_m, nx_);
+  const std::int64_t x1 = index((p_W.x() + cap_m - grid_min_W_.x()) / kColumn_m, nx_);
+  const std::int64_t y0 = index((p_W.y() - cap_m - grid_min_W_.y()) / kColumn_m, ny_);
+  const std::int64_t y1 = index((p_W.y() + cap_m - grid_min_W_.y()) / kColumn_m, ny_);
+  const std::size_t pillar_count = description_.pillars.size();
+  for (std::int64_t y = y0; y <= y1; ++y) {
+    for (std::int64_t x = x0; x <= x1; ++x) {
+      const Range range = column_[column(x, y)];
+      for (std::uint32_t i = range.first; i < range.first + range.count; ++i) {
+        const std::uint32_t object = object_[i];
+        best_m = std::min(best_m, object < pillar_count ? pillar_distance_m(description_.pillars[object], p_W)
+                                                        : box_distance_m(description_.boxes[object - pillar_count], p_W));
+      }
+    }
+  }
+  return best_m;
+}
+
+double World::congestion_ratio(double x_m, double y_m) const noexcept {
+  constexpr double kReach_m = 30.0;
+  constexpr double kCell_m = 10.0;
+  int occupied = 0;
+  int cells = 0;
+  const double z_m = description_.start_W.z();
+  for (double dy_m = -kReach_m; dy_m <= kReach_m; dy_m += kCell_m) {
+    for (double dx_m = -kReach_m; dx_m <= kReach_m; dx_m += kCell_m) {
+      if (dx_m * dx_m + dy_m * dy_m > kReach_m * kReach_m) continue;
+      ++cells;
+      if (clearance_m(Vector3(x_m + dx_m, y_m + dy_m, z_m), 0.5 * kCell_m) < 0.5 * kCell_m) ++occupied;
+    }
+  }
+  return static_cast<double>(occupied) / cells;
+}
+
+}  // namespace roborun::sitl

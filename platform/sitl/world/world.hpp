@@ -1,0 +1,68 @@
+/// The true world: what the cameras see and what the vehicle can hit. Immutable once made.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/geometry/vector.hpp"
+#include "platform/sitl/world/voxel_grid.hpp"
+
+namespace roborun::sitl {
+
+/// A vertical cylinder.
+struct Pillar {
+  double x_m{};
+  double y_m{};
+  double radius_m{};
+  double bottom_m{0.0};
+  double top_m{20.0};
+};
+
+/// Everything a world is made of. The ground is the plane z = 0.
+struct WorldDescription {
+  Aabb bounds_W{};  ///< Where the vehicle's centre may be.
+  Vector3 start_W = Vector3::Zero();
+  Vector3 goal_W = Vector3::Zero();
+  std::vector<Pillar> pillars;
+  std::vector<Aabb> boxes;
+  VoxelGrid voxels;
+};
+
+class World {
+ public:
+  /// Builds the search grid. Throws InputError if start or goal is out of bounds, or bounds are empty or not finite,
+  /// or larger than 20 km.
+  explicit World(WorldDescription description);
+
+  [[nodiscard]] const Aabb& bounds_W() const noexcept { return description_.bounds_W; }
+  [[nodiscard]] const Vector3& start_W() const noexcept { return description_.start_W; }
+  [[nodiscard]] const Vector3& goal_W() const noexcept { return description_.goal_W; }
+  [[nodiscard]] const std::vector<Pillar>& pillars() const noexcept { return description_.pillars; }
+  [[nodiscard]] const std::vector<Aabb>& boxes() const noexcept { return description_.boxes; }
+  [[nodiscard]] const VoxelGrid& voxels() const noexcept { return description_.voxels; }
+
+  /// Distance along a unit direction to the first surface (obstacle or ground), +infinity if none within max_m.
+  [[nodiscard]] double hit_distance_m(const Vector3& origin_W, const Vector3& direction_W, double max_m) const noexcept;
+  /// Distance from a point to the nearest obstacle (the ground is none), at most cap_m; 0 inside an obstacle.
+  [[nodiscard]] double clearance_m(const Vector3& p_W, double cap_m) const noexcept;
+  /// Share of 10 m cells within 30 m of (x, y) that hold an obstacle, 0 .. 1: the colour of the heat map.
+  [[nodiscard]] double congestion_ratio(double x_m, double y_m) const noexcept;
+
+ private:
+  struct Range {
+    std::uint32_t first;
+    std::uint32_t count;
+  };
+  [[nodiscard]] std::size_t column(std::int64_t ix, std::int64_t iy) const noexcept;
+  [[nodiscard]] double hit_object_m(std::uint32_t object, const Vector3& origin_W, const Vector3& direction_W) const noexcept;
+
+  WorldDescription description_;
+  Vector3 grid_min_W_ = Vector3::Zero();
+  std::int64_t nx_{1};
+  std::int64_t ny_{1};
+  std::vector<Range> column_;           ///< Objects over each grid square, into object_.
+  std::vector<std::uint32_t> object_;   ///< Index of a pillar, or of a box + pillars().size().
+};
+
+}  // namespace roborun::sitl

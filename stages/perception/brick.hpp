@@ -1,0 +1,78 @@
+/// A brick: 16^3 cells of 0.3 m in Morton order, and one mip level for each coarser precision up to its own 4.8 m.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/precision.hpp"
+
+namespace roborun::stages {
+
+inline constexpr int kBrickLevel = 4;                        ///< A brick is one cell of this level.
+inline constexpr int kBrickCells = 1 << kBrickLevel;         ///< Per edge.
+inline constexpr std::size_t kCellsPerBrick = 4096;
+inline constexpr double kBrick_m = cell_size_m(kBrickLevel);
+
+/// What a cell holds: kUnknown, or evidence: negative is free, positive occupied. One look through free space makes it
+/// free; one surface makes it occupied whatever was there; kMost / kMiss = 10 looks through it clear the oldest obstacle.
+namespace evidence {
+inline constexpr std::int8_t kUnknown = -128;
+inline constexpr std::int8_t kFree = -1;
+inline constexpr std::int8_t kHit = 6;
+inline constexpr std::int8_t kMiss = 2;
+inline constexpr std::int8_t kMost = 20;
+
+[[nodiscard]] constexpr std::int8_t after_hit(std::int8_t cell) noexcept {
+  const int base = cell > 0 ? cell : 0;
+  return static_cast<std::int8_t>(base + kHit > kMost ? kMost : base + kHit);
+}
+[[nodiscard]] constexpr std::int8_t after_miss(std::int8_t cell) noexcept {
+  return cell > kMiss ? static_cast<std::int8_t>(cell - kMiss) : kFree;
+}
+}  // namespace evidence
+
+/// What a mip entry says of the cells below it: a set of flags.
+namespace content {
+inline constexpr std::uint8_t kUnknown = 1;
+inline constexpr std::uint8_t kOccupied = 2;
+inline constexpr std::uint8_t kFree = 4;  ///< An entry that equals kFree is free all over.
+}  // namespace content
+
+struct Brick {
+  std::array<std::int8_t, kCellsPerBrick> cell{};          ///< Level 0, Morton order: the truth.
+  std::array<std::uint8_t, 512 + 64 + 8 + 1> mip{};        ///< Levels 1 to 4, derived by refresh().
+  std::array<std::uint64_t, 10> coarse_hit{};              ///< Coarse cells already hit in scan `hit_scan`.
+  std::uint32_t hit_scan{};
+  std::int32_t x{}, y{}, z{};                              ///< Position in bricks from the map's corner.
+  std::uint16_t known_count{};                             ///< Cells that are not unknown.
+  bool dirty{};                                            ///< Cells changed since refresh().
+
+  void clear(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
+  /// Derives mip and known_count from cell. O(4096).
+  void refresh() noexcept;
+  /// Flags of the cell of `level` (0 .. 4) with this Morton index. After refresh(). O(1).
+  [[nodiscard]] std::uint8_t flags(int level, std::uint32_t morton) const noexcept;
+  /// Free evidence for all cells below (level, morton).
+  void add_free(int level, std::uint32_t morton) noexcept;
+  /// A surface somewhere in the cell (level, morton). Level 0: that cell is hit. Coarser: occupied cells below it are
+  /// confirmed; if there are none, its unknown cells become occupied; if there are none either, all of them.
+  /// At levels above 0 a second hit in the same scan changes nothing.
+  void add_hit(int level, std::uint32_t morton, std::uint32_t scan) noexcept;
+};
+
+/// Index of an entry in Brick::mip; level 1 .. 4.
+[[nodiscard]] constexpr std::size_t mip_index(int level, std::uint32_t morton) noexcept {
+  constexpr std::array<std::size_t, 5> kStart{0, 0, 512, 576, 584};
+  return kStart[static_cast<std::size_t>(level)] + morton;
+}
+
+/// Interleaves the low four bits of x, y, z: x lowest.
+[[nodiscard]] constexpr std::uint32_t morton3(std::uint32_t x, std::uint32_t y, std::uint32_t z) noexcept {
+  constexpr std::array<std::uint16_t, 16> kSpread{0x000, 0x001, 0x008, 0x009, 0x040, 0x041, 0x048, 0x049,
+                                                  0x200, 0x201, 0x208, 0x209, 0x240, 0x241, 0x248, 0x249};
+  return static_cast<std::uint32_t>(kSpread[x & 15U]) | (static_cast<std::uint32_t>(kSpread[y & 15U]) << 1U) |
+         (static_cast<std::uint32_t>(kSpread[z & 15U]) << 2U);
+}
+
+}  // namespace roborun::stages

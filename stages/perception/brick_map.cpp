@@ -1,0 +1,170 @@
+#include "stages/perception/brick_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/record/state_hash.hpp"
+
+namespace roborun::stages {
+namespace {
+
+constexpr double kCoarsest_m = cell_size_m(kPrecisionLevels - 1);
+constexpr double kMaxPositions = 4e6;
+
+std::int32_t even_bricks(double length_m) noexcept {
+  return 2 * static_cast<std::int32_t>(std::ceil(length_m / kCoarsest_m));
+}
+
+Vector3 corner_of(const Aabb& bounds_W) noexcept {
+  Vector3 corner;
+  for (int i = 0; i < 3; ++i) corner[i] = std::floor(bounds_W.min_W[i] / kCoarsest_m) * kCoarsest_m;
+  return corner;
+}
+
+std::size_t position_count(const Aabb& bounds_W) noexcept {
+  const Vector3 size = bounds_W.max_W - corner_of(bounds_W);
+  return static_cast<std::size_t>(even_bricks(size.x())) * static_cast<std::size_t>(even_bricks(size.y())) *
+         static_cast<std::size_t>(even_bricks(size.z()));
+}
+
+std::size_t pyramid_bytes(std::size_t side) noexcept { return sizeof(DepthPyramid::Bound) * (side * side * 2 + 64); }
+
+}  // namespace
+
+Status BrickMap::Config::validate() const noexcept {
+  const Vector3 size = bounds_W.size();
+  const bool bounds_ok = is_finite(bounds_W.min_W) && is_finite(bounds_W.max_W) && size.minCoeff() > 0.0 && size.maxCoeff() <= 40e3;
+  if (!bounds_ok) return Status::kInvalidArgument;
+  const double positions = 8.0 * std::ceil(size.x() / kCoarsest_m + 1) * std::ceil(size.y() / kCoarsest_m + 1) *
+                           std::ceil(size.z() / kCoarsest_m + 1);
+  const bool ok = positions <= kMaxPositions && max_bricks >= 64 && max_bricks <= 200000 && max_frames >= 1 && max_frames <= 8 &&
+                  max_image_side >= 8 && max_image_side <= DepthPyramid::kMaxPixels && vehicle_radius_m >= 0.0 &&
+                  vehicle_radius_m <= 2.0 && depth_margin_m >= 0.0 && depth_margin_per_m >= 0.0;
+  return ok ? Status::kOk : Status::kInvalidArgument;
+}
+
+std::size_t BrickMap::arena_bytes(const Config& config) noexcept {
+  const std::size_t positions = position_count(config.bounds_W);
+  return positions * (sizeof(std::int32_t) + sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
+         config.max_bricks * (sizeof(Brick) + 2 * sizeof(std::uint32_t)) +
+         config.max_frames * pyramid_bytes(config.max_image_side) + 16 * alignof(std::max_align_t);
+}
+
+BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
+    : config_(config),
+      corner_W_(corner_of(config.bounds_W)),
+      nx_(even_bricks(config.bounds_W.max_W.x() - corner_W_.x())),
+      ny_(even_bricks(config.bounds_W.max_W.y() - corner_W_.y())),
+      nz_(even_bricks(config.bounds_W.max_W.z() - corner_W_.z())) {
+  const std::size_t positions = position_count(config.bounds_W);
+  slot_ = arena.take<std::int32_t>(positions);
+  order_ = arena.take<std::uint32_t>(positions);
+  order_key_ = arena.take<std::uint16_t>(positions);
+  brick_ = arena.take<Brick>(config.max_bricks);
+  free_list_ = arena.take<std::uint32_t>(config.max_bricks);
+  dirty_ = arena.take<std::uint32_t>(config.max_bricks);
+  std::fill(slot_.begin(), slot_.end(), -1);
+  // Highest slot first, so that slots are handed out from 0 up.
+  for (std::size_t i = 0; i < free_list_.size(); ++i) {
+    free_list_[i] = static_cast<std::uint32_t>(free_list_.size() - 1 - i);
+  }
+  free_count_ = free_list_.size();
+  for (std::size_t i = 0; i < config.max_frames; ++i) pyramid_[i].emplace(arena, config.max_image_side);
+}
+
+std::size_t BrickMap::slot_of(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
+  return (static_cast<std::size_t>(bz) * static_cast<std::size_t>(ny_) + static_cast<std::size_t>(by)) *
+             static_cast<std::size_t>(nx_) +
+         static_cast<std::size_t>(bx);
+}
+
+Vector3 BrickMap::brick_center_W(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
+  return corner_W_ + kBrick_m * Vector3(bx + 0.5, by + 0.5, bz + 0.5);
+}
+
+bool BrickMap::cell_of(const Vector3& p_W, Cell& cell) const noexcept {
+  if (!config_.bounds_W.contains(p_W)) return false;  // also refuses NaN
+  const Vector3 local = (p_W - corner_W_) / kFinestCell_m;
+  cell = {static_cast<std::int32_t>(std::floor(local.x())), static_cast<std::int32_t>(std::floor(local.y())),
+          static_cast<std::int32_t>(std::floor(local.z()))};
+  return cell.x < nx_ * kBrickCells && cell.y < ny_ * kBrickCells && cell.z < nz_ * kBrickCells;
+}
+
+Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept {
+  std::int32_t& slot = slot_[slot_of(bx, by, bz)];
+  if (slot < 0) {
+    if (free_count_ == 0 && !give_up_farthest()) {
+      ++counters_.bricks_refused;
+      return nullptr;
+    }
+    slot = static_cast<std::int32_t>(free_list_[--free_count_]);
+    brick_[static_cast<std::size_t>(slot)].clear(bx, by, bz);
+  }
+  Brick& brick = brick_[static_cast<std::size_t>(slot)];
+  if (!brick.dirty && dirty_count_ < dirty_.size()) {
+    dirty_[dirty_count_++] = static_cast<std::uint32_t>(slot);
+    brick.dirty = true;
+  }
+  return &brick;
+}
+
+bool BrickMap::give_up_farthest() noexcept {
+  // The farthest 1/16 at once, so that the walk over all bricks is paid rarely. Only bricks beyond the reach of the
+  // cameras of this scan may go: they are not dirty.
+  constexpr std::size_t kBuckets = 512;
+  constexpr double kBucket_m = 8.0;
+  std::array<std::uint32_t, kBuckets> histogram{};
+  const auto bucket = [this](const Brick& b) {
+    const double distance_m = (brick_center_W(b.x, b.y, b.z) - vehicle_W_).norm();
+    return std::min(static_cast<std::size_t>(distance_m / kBucket_m), kBuckets - 1);
+  };
+  for (const Brick& b : brick_) ++histogram[bucket(b)];
+  std::size_t threshold = kBuckets - 1;
+  std::size_t count = histogram[threshold];
+  while (threshold > 1 && count < brick_.size() / 16) count += histogram[--threshold];
+  std::size_t given_up = 0;
+  for (std::size_t i = 0; i < brick_.size(); ++i) {
+    Brick& b = brick_[i];
+    if (b.dirty || bucket(b) < threshold) continue;
+    slot_[slot_of(b.x, b.y, b.z)] = -1;
+    known_cells_ -= b.known_count;
+    b.known_count = 0;
+    free_list_[free_count_++] = static_cast<std::uint32_t>(i);
+    ++given_up;
+  }
+  counters_.bricks_given_up += given_up;
+  return given_up > 0;
+}
+
+void BrickMap::refresh_dirty() noexcept {
+  for (std::size_t i = 0; i < dirty_count_; ++i) {
+    Brick& b = brick_[dirty_[i]];
+    known_cells_ -= b.known_count;
+    b.refresh();
+    known_cells_ += b.known_count;
+  }
+  dirty_count_ = 0;
+}
+
+double BrickMap::known_volume_m3() const noexcept {
+  return static_cast<double>(known_cells_) * kFinestCell_m * kFinestCell_m * kFinestCell_m;
+}
+
+std::size_t BrickMap::bytes() const noexcept { return arena_bytes(config_); }
+
+std::uint64_t BrickMap::digest() const noexcept {
+  core::StateHash hash;
+  for (std::size_t position = 0; position < slot_.size(); ++position) {
+    if (slot_[position] < 0) continue;
+    hash.add(static_cast<std::uint64_t>(position));
+    const Brick& b = brick_[static_cast<std::size_t>(slot_[position])];
+    for (std::size_t i = 0; i < kCellsPerBrick; i += 8) {
+      std::uint64_t word = 0;
+      for (std::size_t k = 0; k < 8; ++k) word = (word << 8U) | static_cast<std::uint8_t>(b.cell[i + k]);
+      hash.add(word);
+    }
+  }
+  return hash.value();
+}
+
+}  // namespace roborun::stages

@@ -1,0 +1,124 @@
+#include <algorithm>
+#include <cmath>
+
+#include "stages/perception/brick_map.hpp"
+
+namespace roborun::stages {
+
+Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& budget, core::Work& work) noexcept {
+  work = {};
+  work.level = std::clamp(request.level, 0, kPrecisionLevels - 1);
+  if (!is_finite(request.center_W) || !(request.volume_m3 >= 0.0)) return Status::kInvalidArgument;
+  view_level_ = work.level;
+  view_center_W_ = request.center_W;
+
+  // Histogram of known space over distance; the view ends with the last bucket that fits.
+  constexpr std::size_t kBuckets = 512;
+  constexpr double kBucket_m = 2.4;
+  constexpr double kCell_m3 = kFinestCell_m * kFinestCell_m * kFinestCell_m;
+  std::array<std::uint64_t, kBuckets> known{};
+  for (const Brick& b : brick_) {
+    if (b.known_count == 0 || slot_[slot_of(b.x, b.y, b.z)] < 0) continue;
+    const double distance_m = (brick_center_W(b.x, b.y, b.z) - view_center_W_).norm();
+    known[std::min(static_cast<std::size_t>(distance_m / kBucket_m), kBuckets - 1)] += b.known_count;
+    if (++work.units % 1024 == 0 && budget.spent(work)) {
+      // Too late to know what fits: only the nearest space is safe to promise.
+      view_radius_m_ = kBrick_m;
+      return Status::kBudgetSpent;
+    }
+  }
+  Status status = Status::kOk;
+  view_radius_m_ = 1e18;
+  for (std::size_t i = 0; i < kBuckets; ++i) {
+    const double volume_m3 = static_cast<double>(known[i]) * kCell_m3;
+    if (work.volume_m3 + volume_m3 > request.volume_m3 && i > 1) {
+      view_radius_m_ = static_cast<double>(i) * kBucket_m;
+      status = Status::kBudgetSpent;
+      break;
+    }
+    work.volume_m3 += volume_m3;
+  }
+  return status;
+}
+
+const Brick* BrickMap::visible_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
+  if (bx < 0 || by < 0 || bz < 0 || bx >= nx_ || by >= ny_ || bz >= nz_) return nullptr;
+  const std::int32_t slot = slot_[slot_of(bx, by, bz)];
+  if (slot < 0) return nullptr;
+  const double distance2 = (brick_center_W(bx, by, bz) - view_center_W_).squaredNorm();
+  return distance2 < view_radius_m_ * view_radius_m_ ? &brick_[static_cast<std::size_t>(slot)] : nullptr;
+}
+
+bool BrickMap::brick_range_free(const Brick& brick, const Cell& low, const Cell& high, std::uint64_t& lookups) const noexcept {
+  std::array<Node, 7 * kBrickLevel + 1> stack{};
+  std::size_t depth = 0;
+  stack[depth++] = {kBrickLevel, 0, 0, 0};
+  while (depth > 0) {
+    const Node node = stack[--depth];
+    ++lookups;
+    const std::uint8_t flags = brick.flags(node.level, morton3(node.x, node.y, node.z));
+    if (flags == content::kFree) continue;
+    if (node.level <= view_level_) return false;
+    const auto level = static_cast<unsigned>(node.level - 1);
+    for (std::uint32_t child = 0; child < 8; ++child) {
+      const Node next{node.level - 1, 2 * node.x + (child & 1U), 2 * node.y + ((child >> 1U) & 1U), 2 * node.z + (child >> 2U)};
+      const auto outside = [level](std::uint32_t index, std::int32_t from, std::int32_t to) {
+        const auto first = static_cast<std::int32_t>(index << level);
+        return first > to || first + (1 << level) - 1 < from;
+      };
+      if (outside(next.x, low.x, high.x) || outside(next.y, low.y, high.y) || outside(next.z, low.z, high.z)) continue;
+      stack[depth++] = next;
+    }
+  }
+  return true;
+}
+
+bool BrickMap::is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept {
+  Cell low{};
+  Cell high{};
+  const bool ordered = (box_W.min_W.array() <= box_W.max_W.array()).all();
+  if (!ordered || !cell_of(box_W.min_W, low) || !cell_of(box_W.max_W, high)) return false;
+  // Widened to whole cells of p1.
+  const std::int32_t mask = (1 << view_level_) - 1;
+  low = {low.x & ~mask, low.y & ~mask, low.z & ~mask};
+  high = {high.x | mask, high.y | mask, high.z | mask};
+  for (std::int32_t bz = low.z >> kBrickLevel; bz <= high.z >> kBrickLevel; ++bz) {
+    for (std::int32_t by = low.y >> kBrickLevel; by <= high.y >> kBrickLevel; ++by) {
+      for (std::int32_t bx = low.x >> kBrickLevel; bx <= high.x >> kBrickLevel; ++bx) {
+        ++lookups;
+        const Brick* brick = visible_brick(bx, by, bz);
+        if (brick == nullptr) return false;
+        if (brick->flags(kBrickLevel, 0) == content::kFree) continue;
+        const Cell from{low.x - bx * kBrickCells, low.y - by * kBrickCells, low.z - bz * kBrickCells};
+        const Cell to{high.x - bx * kBrickCells, high.y - by * kBrickCells, high.z - bz * kBrickCells};
+        if (!brick_range_free(*brick, from, to, lookups)) return false;
+      }
+    }
+  }
+  return true;
+}
+
+CellState BrickMap::at(const Vector3& p_W, std::uint64_t& lookups) const noexcept {
+  Cell cell{};
+  ++lookups;
+  if (!cell_of(p_W, cell)) return CellState::kUnknown;
+  std::uint8_t flags = 0;
+  const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
+  if (view_level_ <= kBrickLevel) {
+    const Brick* brick = visible_brick(bx, by, bz);
+    if (brick == nullptr) return CellState::kUnknown;
+    const auto inside = [this](std::int32_t c) {
+      return static_cast<std::uint32_t>(c & (kBrickCells - 1)) >> static_cast<unsigned>(view_level_);
+    };
+    flags = brick->flags(view_level_, morton3(inside(cell.x), inside(cell.y), inside(cell.z)));
+  } else {
+    for (std::int32_t child = 0; child < 8; ++child) {
+      const Brick* brick = visible_brick((bx & ~1) + (child & 1), (by & ~1) + ((child >> 1) & 1), (bz & ~1) + (child >> 2));
+      flags = static_cast<std::uint8_t>(flags | (brick == nullptr ? content::kUnknown : brick->flags(kBrickLevel, 0)));
+    }
+  }
+  if ((flags & content::kOccupied) != 0) return CellState::kOccupied;
+  return (flags & content::kUnknown) != 0 ? CellState::kUnknown : CellState::kFree;
+}
+
+}  // namespace roborun::stages

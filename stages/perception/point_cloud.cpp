@@ -1,0 +1,91 @@
+#include "stages/perception/point_cloud.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/precision.hpp"
+#include "core/random/counter_rng.hpp"
+#include "stages/perception/depth_pyramid.hpp"
+
+namespace roborun::stages {
+
+PointCloud::PointCloud(const Config& config, core::Arena& arena) noexcept
+    : grid_(arena.take<Entry>(config.max_points)),
+      point_(arena.take<CloudPoint>(config.max_points)),
+      used_(arena.take<std::uint32_t>(config.max_points)) {}
+
+void PointCloud::set_height_limits(double low_m, double high_m) noexcept {
+  low_m_ = low_m;
+  high_m_ = high_m;
+}
+
+bool PointCloud::add(const Vector3& p_W, double cell_m) noexcept {
+  std::uint64_t key = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double index = std::clamp(std::floor(p_W[i] / cell_m), -1048576.0, 1048575.0);
+    key = (key << 21U) | static_cast<std::uint64_t>(static_cast<std::int64_t>(index) + 1048576);
+  }
+  key |= std::uint64_t{1} << 63U;
+  const std::size_t mask = grid_.size() - 1;
+  std::size_t slot = core::mix64(key) & mask;
+  while (grid_[slot].key != 0 && grid_[slot].key != key) slot = (slot + 1) & mask;  // bounded: never more than 3/4 full
+  if (grid_[slot].key == 0) {
+    if (count_ >= grid_.size() - grid_.size() / 4) {
+      ++counters_.points_dropped;
+      return false;
+    }
+    grid_[slot] = {key, static_cast<std::uint32_t>(count_)};
+    used_[count_] = static_cast<std::uint32_t>(slot);
+    point_[count_++] = {};
+  }
+  CloudPoint& point = point_[grid_[slot].point];
+  point.p_W += p_W;  // a sum until the end of the step
+  ++point.count;
+  return true;
+}
+
+Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core::StageBudget& budget, core::Work& work) noexcept {
+  ++counters_.steps;
+  for (std::size_t i = 0; i < count_; ++i) grid_[used_[i]] = {};
+  count_ = 0;
+  seen_volume_m3_ = 0.0;
+  work = {};
+  work.level = level;
+  const double cell_m = cell_size_m(level);
+  std::size_t usable = 0;
+  bool full = false;
+  bool spent = false;
+  for (const PosedDepthFrame& posed : frames) {
+    if (check_frame(posed) != Status::kOk) {
+      ++counters_.frames_refused;
+      continue;
+    }
+    ++usable;
+    const firmware_if::DepthFrame& frame = posed.frame;
+    const double t = static_cast<double>(frame.tan_half_fov_ratio);
+    const double pixel_area = 4.0 * t * t / (frame.width * frame.height);  // of the plane at depth 1
+    for (int v = 0; v < frame.height && !spent; ++v) {
+      const double z = t - (v + 0.5) * 2.0 * t / frame.height;
+      for (int u = 0; u < frame.width; ++u) {
+        const float raw_m = frame.depth_m[static_cast<std::size_t>(v) * frame.width + static_cast<std::size_t>(u)];
+        if (!(raw_m > 0.0F)) continue;
+        const double y = t - (u + 0.5) * 2.0 * t / frame.width;
+        const Vector3 direction_W = posed.X_WC.R_RT * Vector3(1.0, y, z);
+        double depth_m = std::fmin(static_cast<double>(raw_m), static_cast<double>(frame.range_m));
+        if (raw_m < frame.range_m && !add(posed.X_WC.p_RT + depth_m * direction_W, cell_m)) full = true;
+        const double height_m = posed.X_WC.p_RT.z();
+        if (direction_W.z() > 0.0) depth_m = std::fmin(depth_m, std::fmax(high_m_ - height_m, 0.0) / direction_W.z());
+        if (direction_W.z() < 0.0) depth_m = std::fmin(depth_m, std::fmax(height_m - low_m_, 0.0) / -direction_W.z());
+        seen_volume_m3_ += pixel_area * depth_m * depth_m * depth_m / 3.0;
+      }
+      work.units += frame.width;
+      spent = budget.spent(work);
+    }
+  }
+  for (std::size_t i = 0; i < count_; ++i) point_[i].p_W /= point_[i].count;
+  if (usable == 0) return Status::kInvalidArgument;
+  if (spent) return Status::kBudgetSpent;
+  return full ? Status::kCapacity : Status::kOk;
+}
+
+}  // namespace roborun::stages

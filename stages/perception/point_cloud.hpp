@@ -1,0 +1,71 @@
+/// Depth images as a point cloud, one averaged point a cell. Source: RoboRun, precision operator p0 of the point cloud.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/executive/stage_budget.hpp"
+#include "core/memory/arena.hpp"
+#include "stages/perception/occupancy_map.hpp"
+#include "stages/stage.hpp"
+
+namespace roborun::stages {
+
+/// Mean of the end points that fell into one cell of the grid.
+struct CloudPoint {
+  Vector3 p_W = Vector3::Zero();
+  std::uint32_t count{};
+};
+
+class PointCloud {
+ public:
+  struct Config {
+    std::size_t max_points{65536};  ///< Cells of the grid, a power of two. [256, 4194304]
+    [[nodiscard]] constexpr Status validate() const noexcept {
+      const bool power = max_points != 0 && (max_points & (max_points - 1)) == 0;
+      return power && max_points >= 256 && max_points <= 4194304 ? Status::kOk : Status::kInvalidArgument;
+    }
+  };
+  /// Never decrease.
+  struct Counters {
+    std::uint64_t steps{}, frames_refused{}, points_dropped{};
+  };
+
+  [[nodiscard]] static constexpr std::size_t arena_bytes(const Config& config) noexcept {
+    return config.max_points * (sizeof(Entry) + sizeof(CloudPoint) + sizeof(std::uint32_t)) + 64;
+  }
+  /// Precondition: config.validate() is kOk. Check arena.exhausted() afterwards.
+  PointCloud(const Config& config, core::Arena& arena) noexcept;
+
+  /// Averages the surfaces of all frames in cells of cell_size_m(level). Bad frames are refused whole and counted; when
+  /// three quarters of the grid are full, further new cells are dropped and counted (kCapacity). kInvalidArgument if no
+  /// frame was usable. work.units counts pixels. RT-safe: O(pixels), polls the budget every row: kBudgetSpent.
+  [[nodiscard]] Status step(std::span<const PosedDepthFrame> frames, int level, core::StageBudget& budget, core::Work& work) noexcept;
+  /// Points of the last step, in the order in which their cells were first met: the same on every machine.
+  [[nodiscard]] std::span<const CloudPoint> points() const noexcept { return point_.first(count_); }
+  /// Space between the cameras and what they see in the last step: pyramids of the pixels, cut at the height limits.
+  [[nodiscard]] double seen_volume_m3() const noexcept { return seen_volume_m3_; }
+  /// Space counts only between these heights (what the map stores).
+  void set_height_limits(double low_m, double high_m) noexcept;
+  [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+
+ private:
+  struct Entry {
+    std::uint64_t key{};  ///< 0: empty.
+    std::uint32_t point{};
+  };
+  bool add(const Vector3& p_W, double cell_m) noexcept;
+
+  std::span<Entry> grid_;
+  std::span<CloudPoint> point_;
+  std::span<std::uint32_t> used_;  ///< Grid entries to clear before the next step.
+  std::size_t count_{0};
+  double seen_volume_m3_{0.0};
+  double low_m_{-1e9};
+  double high_m_{1e9};
+  Counters counters_{};
+};
+static_assert(Stage<PointCloud>);
+
+}  // namespace roborun::stages

@@ -1,0 +1,35 @@
+/// The profiling variables of RoboRun, from one point cloud, the map and the committed trajectory.
+#pragma once
+
+#include <span>
+
+#include "core/geometry/vector.hpp"
+#include "core/space_profile.hpp"
+#include "core/trajectory.hpp"
+#include "stages/perception/map_view.hpp"
+#include "stages/perception/point_cloud.hpp"
+
+namespace roborun::stages {
+
+struct SpaceProfilerConfig {
+  double vehicle_width_m{1.2};   ///< A gap narrower than this is no gap.
+  double widest_gap_m{20.0};     ///< A gap wider than this does not ask for precision.
+  double gap_reach_m{15.0};      ///< Obstacles farther than this belong to a later decision.
+  double height_band_m{1.5};     ///< Points this much above or below the vehicle can stand in its way.
+  double outlook_step_s{0.25};   ///< Spacing of the samples along the trajectory (doubled until they fit).
+  double max_visible_m{25.0};    ///< The range of the cameras.
+};
+
+/// Gaps: the points in the height band are sorted into 5 degree sectors (nearest point each); neighbouring sectors whose
+/// nearest points are closer to each other than the vehicle is wide belong to one obstacle; a gap is the distance between
+/// the facing edges of neighbouring obstacles, all around. No gap: +infinity.
+/// Closest obstacle: nearest point within `relevant_W` (where the vehicle may be, grown by its radius), +infinity if none.
+/// Closest unknown: free distance in `view` ahead along v_WB, at rest towards goal_W; at most max_visible_m.
+/// Outlook: up to 32 samples of the trajectory from `now` to its end, each with the free distance along its motion there.
+/// `lookups` counts map cells visited. RT-safe: O(points + samples * range / cell).
+void profile_space(const SpaceProfilerConfig& config, std::span<const CloudPoint> points, const MapView& view,
+                   const Trajectory& committed, MonotonicTime now, const Vector3& p_WB, const Vector3& v_WB,
+                   const Vector3& goal_W, const Aabb& relevant_W, double radius_m, SpaceProfile& profile,
+                   std::uint64_t& lookups) noexcept;
+
+}  // namespace roborun::stages

@@ -1,0 +1,325 @@
+#include "stages/planning/smoother.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "core/memory/static_vector.hpp"
+
+namespace roborun::stages {
+namespace {
+
+using Vector10 = Eigen::Matrix<double, 10, 1>;
+using Matrix4 = Eigen::Matrix4d;
+using Ends3 = Eigen::Matrix<double, 10, 3>;
+using Block = Eigen::Matrix<double, 4, 3>;
+
+constexpr double kSameWaypoint_m = 0.25;
+constexpr double kMinSegment_s = 0.15;
+constexpr double kProfileShare = 0.60;   // of the acceleration limit: the curve around the profile needs the rest
+constexpr double kCornerCut_m = 0.6;     // how far a corner may be cut
+constexpr double kLimitTolerance = 1.05;
+constexpr int kSamples = 12;             // per segment, for the limits
+constexpr int kStretchRounds = 10;
+constexpr int kSplitRounds = 6;
+constexpr int kSlowRounds = 4;
+
+/// Distance needed to change between two speeds.
+double change_m(double from_mps, double to_mps, double a_mps2) noexcept {
+  return std::fabs(to_mps * to_mps - from_mps * from_mps) / (2.0 * a_mps2);
+}
+
+double corner_speed_mps(const Vector3& before, const Vector3& after, double a_mps2) noexcept {
+  const double cosine = std::clamp(before.normalized().dot(after.normalized()), -1.0, 1.0);
+  const double half = std::sqrt(0.5 * (1.0 + cosine));  // cosine of half the turn
+  if (half > 0.9999) return 1e9;
+  return std::sqrt(a_mps2 * kCornerCut_m * half / (1.0 - half));
+}
+
+}  // namespace
+
+Smoother::Smoother() noexcept {
+  Matrix10 ends = Matrix10::Zero();  // ends = ends_of_coefficient * c
+  for (int d = 0; d < 5; ++d) {
+    double falling = 1.0;
+    for (int i = 0; i < d; ++i) falling *= d - i;
+    ends(d, d) = falling;
+    for (int k = d; k < 10; ++k) {
+      double product = 1.0;
+      for (int i = 0; i < d; ++i) product *= k - i;
+      ends(5 + d, k) = product;
+    }
+  }
+  coefficient_of_ends_ = Eigen::PartialPivLU<Matrix10>(ends).inverse();
+  Matrix10 hessian = Matrix10::Zero();
+  for (int i = 4; i < 10; ++i) {
+    for (int k = 4; k < 10; ++k) {
+      double product = 1.0;
+      for (int d = 0; d < 4; ++d) product *= static_cast<double>((i - d) * (k - d));
+      hessian(i, k) = product / (i + k - 7);
+    }
+  }
+  snap_cost_ = coefficient_of_ends_.transpose() * hessian * coefficient_of_ends_;
+}
+
+bool Smoother::allocate(std::span<const Vector3> path_W, const TrajectoryPoint& start, const MotionLimits& limits, Plan& plan) const noexcept {
+  const std::size_t n = path_W.size();
+  const double a_mps2 = kProfileShare * limits.acceleration_mps2;
+  std::array<double, kMaxKnots> speed_mps{};
+  const Vector3 first = (path_W[1] - path_W[0]).normalized();
+  speed_mps[0] = std::max(start.v_W.dot(first), 0.0);
+  for (std::size_t i = 1; i + 1 < n; ++i) {
+    speed_mps[i] = std::min(limits.speed_mps, corner_speed_mps(path_W[i] - path_W[i - 1], path_W[i + 1] - path_W[i], a_mps2));
+  }
+  speed_mps[n - 1] = 0.0;
+  for (std::size_t i = n - 1; i-- > 1;) {
+    const double length_m = (path_W[i + 1] - path_W[i]).norm();
+    speed_mps[i] = std::min(speed_mps[i], std::sqrt(speed_mps[i + 1] * speed_mps[i + 1] + 2.0 * a_mps2 * length_m));
+  }
+  plan.count = 0;
+  const auto add = [&plan](const Vector3& p_W, double time_s) {
+    if (plan.count == kMaxKnots) return false;
+    plan.knot_W[plan.count] = p_W;
+    plan.time_s[plan.count++] = std::max(time_s, kMinSegment_s);
+    return true;
+  };
+  if (!add(path_W[0], 0.0)) return false;
+  for (std::size_t i = 0; i + 1 < n; ++i) {
+    const Vector3 way = path_W[i + 1] - path_W[i];
+    const double length_m = way.norm();
+    const double v0 = speed_mps[i];
+    // Forward: what can be reached from here.
+    speed_mps[i + 1] = std::min(speed_mps[i + 1], std::sqrt(v0 * v0 + 2.0 * a_mps2 * length_m));
+    const double v1 = speed_mps[i + 1];
+    const double peak = std::max({std::min(limits.speed_mps, std::sqrt(std::max(a_mps2 * length_m + 0.5 * (v0 * v0 + v1 * v1), 0.0))), v1, 0.05});
+    const double up_m = std::min(change_m(v0, peak, a_mps2), length_m);
+    const double down_m = std::min(change_m(peak, v1, a_mps2), length_m - up_m);
+    const double cruise_m = std::max(length_m - up_m - down_m, 0.0);
+    const double up_s = 2.0 * up_m / (v0 + peak);
+    const double cruise_s = cruise_m / peak;
+    const double down_s = 2.0 * down_m / (peak + v1);
+    const bool last = i + 2 == n;
+    // Knots where the speed profile bends, if the pieces are long enough to be worth one.
+    double pending_s = up_s;
+    if (up_m > 1.5 && cruise_m + down_m > 1.5) {
+      if (!add(path_W[i] + way * (up_m / length_m), up_s)) return false;
+      pending_s = 0.0;
+    }
+    pending_s += cruise_s;
+    if (down_m > (last ? 0.3 : 1.5) && cruise_m + up_m > 1.0 && (pending_s > kMinSegment_s)) {
+      if (cruise_m > 0.3 || pending_s > cruise_s) {
+        if (!add(path_W[i] + way * ((up_m + cruise_m) / length_m), pending_s)) return false;
+        pending_s = 0.0;
+      }
+    }
+    if (last) plan.brake_knot = plan.count - 1;
+    if (!add(path_W[i + 1], pending_s + down_s)) return false;
+  }
+  return true;
+}
+
+bool Smoother::solve(const Plan& plan, const TrajectoryPoint& start, Trajectory& out) const noexcept {
+  // Unknown: velocity, acceleration, jerk, snap at each inner knot, for the three axes at once.
+  const std::size_t segments = plan.count - 1;
+  std::array<Matrix4, kMaxKnots> diagonal{};
+  std::array<Matrix4, kMaxKnots> upper{};
+  std::array<Block, kMaxKnots> right{};
+  for (std::size_t k = 0; k < plan.count; ++k) {
+    diagonal[k].setZero();
+    right[k].setZero();
+  }
+  std::array<Block, kMaxKnots> x{};
+  for (Block& block : x) block.setZero();
+  x[0].row(0) = start.v_W.transpose();
+  x[0].row(1) = start.a_W.transpose();
+  x[0].row(2) = start.j_W.transpose();
+
+  for (std::size_t k = 0; k < segments; ++k) {
+    const double T = plan.time_s[k + 1];
+    Vector10 scale;
+    scale << 1.0, T, T * T, T * T * T, T * T * T * T, 1.0, T, T * T, T * T * T, T * T * T * T;
+    const double T7 = T * T * T * T * T * T * T;
+    const Matrix10 Q = (scale.asDiagonal() * snap_cost_ * scale.asDiagonal()) / T7;
+    const Eigen::Matrix<double, 1, 3> p0 = plan.knot_W[k].transpose();
+    const Eigen::Matrix<double, 1, 3> p1 = plan.knot_W[k + 1].transpose();
+    diagonal[k] += Q.block<4, 4>(1, 1);
+    diagonal[k + 1] += Q.block<4, 4>(6, 6);
+    upper[k] = Q.block<4, 4>(1, 6);
+    right[k] -= Q.block<4, 1>(1, 0) * p0 + Q.block<4, 1>(1, 5) * p1;
+    right[k + 1] -= Q.block<4, 1>(6, 0) * p0 + Q.block<4, 1>(6, 5) * p1;
+  }
+  if (segments > 1) {
+    right[1] -= upper[0].transpose() * x[0];
+    std::array<Matrix4, kMaxKnots> gain{};
+    for (std::size_t k = 1; k < segments; ++k) {  // block Gauss elimination; the end is at rest: x[segments] = 0
+      const Matrix4 inverse = Eigen::PartialPivLU<Matrix4>(diagonal[k]).inverse();
+      gain[k] = inverse * upper[k];
+      right[k] = (inverse * right[k]).eval();
+      if (k + 1 < segments) {
+        diagonal[k + 1] -= upper[k].transpose() * gain[k];
+        right[k + 1] -= upper[k].transpose() * right[k];
+      }
+    }
+    for (std::size_t k = segments - 1; k >= 1; --k) x[k] = right[k] - gain[k] * x[k + 1];
+  }
+
+  out.segment_count = segments;
+  for (std::size_t k = 0; k < segments; ++k) {
+    const double T = plan.time_s[k + 1];
+    Ends3 ends;
+    ends.row(0) = plan.knot_W[k].transpose();
+    ends.row(5) = plan.knot_W[k + 1].transpose();
+    double power = T;
+    for (int d = 0; d < 4; ++d, power *= T) {
+      ends.row(1 + d) = power * x[k].row(d);
+      ends.row(6 + d) = power * x[k + 1].row(d);
+    }
+    const Ends3 coefficient = coefficient_of_ends_ * ends;
+    if (!coefficient.allFinite()) return false;
+    out.segment[k].duration_s = T;
+    power = 1.0;
+    for (int i = 0; i < 10; ++i, power /= T) out.segment[k].coefficient[static_cast<std::size_t>(i)] = power * coefficient.row(i).transpose();
+  }
+  out.brake_begin_s = 0.0;
+  for (std::size_t k = 0; k < plan.brake_knot; ++k) out.brake_begin_s += plan.time_s[k + 1];
+  return true;
+}
+
+bool Smoother::stretch_to_limits(Plan& plan, const SmoothRequest& request, const MotionLimits& limits, Trajectory& out) const noexcept {
+  const double speed_limit = std::max(limits.speed_mps, request.start.v_W.norm()) * kLimitTolerance + 0.05;
+  const double acceleration_limit = std::max(limits.acceleration_mps2, request.start.a_W.norm()) * kLimitTolerance + 0.05;
+  for (int round = 0; round < kStretchRounds; ++round) {
+    if (!solve(plan, request.start, out)) return false;
+    bool fine = true;
+    for (std::size_t k = 0; k < out.segment_count; ++k) {
+      Trajectory one;
+      one.segment_count = 1;
+      one.segment[0] = out.segment[k];
+      double worst = 1.0;
+      for (int i = 0; i <= kSamples; ++i) {
+        const TrajectoryPoint p = one.at_s(0.9999 * out.segment[k].duration_s * i / kSamples);
+        worst = std::max({worst, p.v_W.norm() / speed_limit, std::sqrt(p.a_W.norm() / acceleration_limit)});
+      }
+      if (worst > 1.0) {
+        fine = false;
+        plan.time_s[k + 1] *= std::min(1.0 + 1.1 * (worst - 1.0) + 0.02, 1.5);
+      }
+    }
+    if (fine) return true;
+  }
+  return false;
+}
+
+Status Smoother::smooth(const SmoothRequest& request, const MapView& view, core::StageBudget& budget, SmoothResult& result) noexcept {
+  result.work = {};
+  const bool finite = is_finite(request.start.p_W) && is_finite(request.start.v_W) && is_finite(request.start.a_W) &&
+                      is_finite(request.start.j_W) && request.limits.speed_mps > 0.0 && request.limits.speed_mps <= 30.0 &&
+                      request.limits.acceleration_mps2 > 0.0 && request.limits.acceleration_mps2 <= 20.0 && request.radius_m > 0.0;
+  if (!finite || request.start.v_W.norm() > 50.0) return Status::kInvalidArgument;
+  core::StaticVector<Vector3, kMaxKnots> original;
+  for (const Vector3& p_W : request.path_W) {
+    if (!is_finite(p_W)) return Status::kInvalidArgument;
+    if (!original.empty() && (p_W - original.back()).norm() < kSameWaypoint_m) continue;
+    if (!original.push_back(original.empty() ? request.start.p_W : p_W)) break;
+  }
+  if (original.size() < 2) return Status::kInvalidArgument;
+
+  MotionLimits limits = request.limits;
+  Trajectory candidate;
+  candidate.start_time = request.start_time;
+  Plan plan;
+  for (int slow = 0; slow < kSlowRounds; ++slow, limits.speed_mps *= 0.6) {
+    core::StaticVector<Vector3, kMaxKnots> path = original;
+    for (int split = 0; split <= kSplitRounds; ++split) {
+      if (budget.spent(result.work)) return Status::kBudgetSpent;
+      if (!allocate({path.begin(), path.size()}, request.start, limits, plan)) break;
+      if (!stretch_to_limits(plan, request, limits, candidate)) break;
+      std::size_t bad = 0;
+      if (is_trajectory_free(view, candidate, 0.0, request.radius_m, result.work.units, &bad)) {
+        result.trajectory = candidate;
+        return Status::kOk;
+      }
+      // One more way-point in the middle of the straight piece that the bad segment belongs to.
+      const Vector3 middle = 0.5 * (plan.knot_W[bad] + plan.knot_W[bad + 1]);
+      std::size_t piece = 0;
+      double nearest_m = 1e300;
+      for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+        const Vector3 way = path[i + 1] - path[i];
+        const double along = std::clamp((middle - path[i]).dot(way) / way.squaredNorm(), 0.0, 1.0);
+        const double distance_m = (path[i] + along * way - middle).norm();
+        if (distance_m < nearest_m) {
+          nearest_m = distance_m;
+          piece = i;
+        }
+      }
+      if ((path[piece + 1] - path[piece]).norm() < 4.0 * kSameWaypoint_m) break;
+      core::StaticVector<Vector3, kMaxKnots> finer;
+      bool fits = true;
+      for (std::size_t i = 0; i < path.size(); ++i) {
+        fits = finer.push_back(path[i]) && fits;
+        if (i == piece) fits = finer.push_back(0.5 * (path[i] + path[i + 1])) && fits;
+      }
+      if (!fits) break;
+      path = finer;
+    }
+  }
+  return Status::kNoPath;
+}
+
+Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, const MotionLimits& limits, Trajectory& out) const noexcept {
+  const double speed_mps = start.v_W.norm();
+  const bool finite = is_finite(start.p_W) && is_finite(start.v_W) && is_finite(start.a_W) && is_finite(start.j_W);
+  if (!finite || speed_mps > 50.0 || !(limits.acceleration_mps2 > 0.0)) return Status::kInvalidArgument;
+  if (speed_mps < 0.02) {
+    out = Trajectory::hold(start.p_W, start_time);
+    return Status::kOk;
+  }
+  const double limit_mps2 = std::max(limits.acceleration_mps2, start.a_W.norm()) * kLimitTolerance;
+  Trajectory candidate;
+  candidate.start_time = start_time;
+  Plan plan;
+  plan.count = 2;
+  plan.knot_W[0] = start.p_W;
+  double time_s = std::max(1.2 * speed_mps / limits.acceleration_mps2, 0.3);
+  for (int round = 0; round < 16; ++round, time_s *= 1.15) {
+    plan.knot_W[1] = start.p_W + 0.5 * time_s * start.v_W + (time_s * time_s / 12.0) * start.a_W;
+    plan.time_s[1] = time_s;
+    if (!solve(plan, start, candidate)) continue;
+    double worst_mps2 = 0.0;
+    for (int i = 1; i < 2 * kSamples; ++i) worst_mps2 = std::max(worst_mps2, candidate.at_s(time_s * i / (2.0 * kSamples)).a_W.norm());
+    if (worst_mps2 <= limit_mps2) break;
+  }
+  candidate.brake_begin_s = 0.0;
+  out = candidate;
+  return Status::kOk;
+}
+
+bool is_trajectory_free(const MapView& view, const Trajectory& trajectory, double from_s, double radius_m,
+                        std::uint64_t& lookups, std::size_t* segment) noexcept {
+  if (trajectory.segment_count == 0) return view.is_free(Aabb::around(trajectory.hold_W, radius_m), lookups);
+  const double start_s = from_s > 0.0 ? from_s : 0.0;
+  double segment_begin_s = 0.0;
+  Vector3 last_W = trajectory.at_s(start_s).p_W;
+  for (std::size_t k = 0; k < trajectory.segment_count; ++k) {
+    const double duration_s = trajectory.segment[k].duration_s;
+    const double first_s = std::max(start_s - segment_begin_s, 0.0);
+    if (first_s <= duration_s) {
+      // Chords of about the vehicle's radius; at 6 m/s the curve leaves such a chord by less than 2 cm.
+      const double length_m = (trajectory.at_s(segment_begin_s + duration_s).p_W - last_W).norm() + 0.1;
+      const int count = std::clamp(static_cast<int>(2.0 * length_m / radius_m), 6, 200);
+      for (int i = 1; i <= count; ++i) {
+        const Vector3 p_W = trajectory.at_s(segment_begin_s + first_s + (duration_s - first_s) * i / count).p_W;
+        const Aabb swept{last_W.cwiseMin(p_W) - Vector3::Constant(radius_m), last_W.cwiseMax(p_W) + Vector3::Constant(radius_m)};
+        if (!view.is_free(swept, lookups)) {
+          if (segment != nullptr) *segment = k;
+          return false;
+        }
+        last_W = p_W;
+      }
+    }
+    segment_begin_s += duration_s;
+  }
+  return true;
+}
+
+}  // namespace roborun::stages
