@@ -13,7 +13,6 @@ constexpr double kStaticV2_m3 = 150e3;
 constexpr double kAwareV0_m3 = 60e3;
 constexpr double kAwareV1_m3 = 1e6;
 constexpr double kStaticSpeed_mps = 0.5;
-constexpr double kMinPlannerShare = 0.25;  // of the perceived volume: what a plan through it explores at least
 
 constexpr std::size_t index(core::StageId id) noexcept { return static_cast<std::size_t>(id); }
 
@@ -113,17 +112,33 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   const Policy& policy = config_.policy;
   Decision d;
 
-  // 1. How long may we think?
-  const BudgetLimits limits{policy.shortest, from_seconds(2.0 * seconds(policy.longest_after_failures))};
+  // 1. How precisely must we look? An obstacle grows by up to a cell, and so does the vehicle's box, on either side of a
+  // gap: of width g it is passable for certain on cells of (g - width) / 4.
+  const double gap_cell_m = 0.25 * (profile.gap_average_m - config_.vehicle_width_m);
+  d.demand_m = std::fmin(gap_cell_m, profile.closest_obstacle_m / policy.cells_to_obstacle);
+  int coarsest = std::min(coarsest_level_within(d.demand_m), config_.coarsest_level);
+  coarsest = std::min(coarsest, last_level_ + policy.coarser_levels_per_decision);
+  const int extra = std::max(situation.failures - policy.failures_until_finer + 1, 0);
+  coarsest = std::max(coarsest - extra, 0);
+  const bool near_goal = situation.distance_to_goal_m < policy.near_goal_m;
+  if (near_goal) coarsest = std::min(coarsest, 1);
+  const double overhead_s = config_.point_cloud_s + config_.governor_s + config_.smoother_s;
+  const double see_m3 = profile.sensor_volume_m3;
+  const auto needed_s = [&](int level, double share) {
+    return (overhead_s + predicted_s(0, level, share * see_m3) + predicted_s(1, level, share * see_m3) +
+            predicted_s(2, level, share * policy.planner_share * see_m3)) * (1.0 + policy.reserve_ratio);
+  };
+
+  // 2. How long may we think? As long as is safe, but no longer than is useful.
+  const BudgetLimits limits{policy.shortest, policy.longest_budget};
   const bool has_outlook = profile.outlook_count > 0;
   d.time_budget = has_outlook ? trajectory_budget({profile.outlook.data(), profile.outlook_count}, config_.stopping, limits)
                               : time_budget(profile.closest_unknown_m, profile.speed_mps, config_.stopping, limits);
   d.source = has_outlook ? BudgetSource::kTrajectory : BudgetSource::kVisibility;
-  const int extra = std::max(situation.failures - policy.failures_until_finer + 1, 0);
-  const double longest_s = std::min(seconds(policy.longest) * (1.0 + extra), seconds(policy.longest_after_failures));
   double deadline_s = seconds(d.time_budget) / policy.decisions_per_budget;
-  if (deadline_s >= longest_s) {
-    deadline_s = longest_s;
+  const double useful_s = std::max(seconds(policy.longest), needed_s(coarsest, 1.0));
+  if (deadline_s >= useful_s) {
+    deadline_s = useful_s;
     d.source = extra > 0 ? BudgetSource::kFailures : BudgetSource::kLongest;
   }
   if (deadline_s < seconds(policy.shortest)) {
@@ -131,17 +146,10 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
     d.source = BudgetSource::kShortest;
   }
 
-  // 2. How precisely must we look? A gap of width g is passable on a grid of cell p if a cell is lost on either side.
-  const double half_gap_m = 0.5 * (profile.gap_average_m - config_.vehicle_width_m);
-  d.demand_m = std::fmin(half_gap_m, profile.closest_obstacle_m);
-  int coarsest = std::min(coarsest_level_within(d.demand_m), config_.coarsest_level);
-  coarsest = std::min(coarsest, last_level_ + policy.coarser_levels_per_decision);
-  coarsest = std::max(coarsest - extra, 0);
-  const bool near_goal = situation.distance_to_goal_m < policy.near_goal_m;
-  if (near_goal) coarsest = std::min(coarsest, 1);
+  // Time wins over precision: the deadline belongs to physics. Coarser until enough of the space can be seen in time.
+  while (coarsest < config_.coarsest_level && needed_s(coarsest, policy.least_share) > deadline_s) ++coarsest;
 
   // 3. The operating point.
-  const double overhead_s = config_.point_cloud_s + config_.governor_s + config_.smoother_s;
   SolverProblem& p = d.problem;
   p.delta_d_s = deadline_s * (1.0 - policy.reserve_ratio) - overhead_s;
   p.model = config_.model;
@@ -156,29 +164,22 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   p.v_map_m3 = profile.map_volume_m3;
   p.v0_max_m3 = kAwareV0_m3;
   p.v1_max_m3 = kAwareV1_m3;
-  p.v2_max_m3 = std::min(2.0 * config_.sensor_volume_max_m3, kAwareV1_m3);
+  p.v2_max_m3 = policy.planner_share * see_m3;
   d.solution = solve(p);
   fill_prediction(d);
   last_level_ = d.solution.p0_level;
 
   // Infeasible: the quickest decision there is; until it is there the vehicle lives on its braking tail.
-  double total_s = overhead_s + d.solution.latency_s;
   if (d.solution.status == Status::kInfeasible) {
-    const double least_m3 = 0.5 * profile.sensor_volume_m3;
-    d.solution.v0_m3 = least_m3;
-    d.solution.v1_m3 = least_m3;
-    d.solution.v2_m3 = kMinPlannerShare * least_m3;
+    d.solution.v0_m3 = policy.least_share * see_m3;
+    d.solution.v1_m3 = d.solution.v0_m3;
+    d.solution.v2_m3 = policy.planner_share * d.solution.v0_m3;
     fill_prediction(d);
-    total_s = 0.0;
-    for (const double s : d.predicted_s) total_s += s;
-    deadline_s = std::max(deadline_s, total_s * (1.0 + policy.reserve_ratio) + seconds(config_.minor_frame));
+    deadline_s = std::max(deadline_s, needed_s(d.solution.p1_level, policy.least_share) + seconds(config_.minor_frame));
   }
 
   // 4. How fast may the next trajectory be?
-  const double see_m3 = profile.sensor_volume_m3;
-  const double needed_s = overhead_s + predicted_s(0, coarsest, see_m3) + predicted_s(1, coarsest, see_m3) +
-                          predicted_s(2, coarsest, kMinPlannerShare * see_m3);
-  double speed_mps = std::clamp(safe_speed_mps(profile.closest_unknown_m, needed_s), policy.slowest_mps, v_max_mps_);
+  double speed_mps = std::clamp(safe_speed_mps(profile.closest_unknown_m, needed_s(coarsest, 1.0)), policy.slowest_mps, v_max_mps_);
   if (near_goal) speed_mps = std::min(speed_mps, policy.near_goal_speed_mps);
 
   d.point = {d.solution.p0_level, d.solution.p1_level, d.solution.v0_m3, d.solution.v1_m3, d.solution.v2_m3, whole_frames(deadline_s), speed_mps};

@@ -32,10 +32,14 @@ struct Policy {
   /// hence T = budget / 2. (The authors' code has the factor, without the reason.)
   double decisions_per_budget{2.0};
   Nanos shortest{200'000'000};            ///< No decision shorter than this.
-  Nanos longest{800'000'000};             ///< More thinking than this makes flight slower, not better.
-  Nanos longest_after_failures{6'000'000'000};  ///< ... unless the planner keeps failing: then up to the true budget.
+  /// More thinking than this makes flight slower, not better, unless the precision that the space asks for takes longer.
+  Nanos longest{800'000'000};
+  Nanos longest_budget{15'000'000'000};   ///< The authors' cap: what a standing vehicle is given.
   int failures_until_finer{2};            ///< From this many failed decisions on, one level finer for each.
   int coarser_levels_per_decision{1};     ///< Precision is lost slowly and won at once.
+  double cells_to_obstacle{2.0};          ///< At least so many cells between the vehicle and the nearest obstacle.
+  double planner_share{0.4};              ///< Of the perceived space, what a plan through it explores at most.
+  double least_share{0.5};                ///< Of the space in view: seeing less is not worth a decision.
   double near_goal_m{8.0};                ///< Nearer than this: at most 0.6 m cells ...
   double near_goal_speed_mps{2.5};        ///< ... and this speed.
   double reserve_ratio{0.06};             ///< Share of the deadline that is not planned for.
@@ -71,7 +75,7 @@ struct Decision {
   SolverProblem problem{};
   SolverSolution solution{};
   std::array<double, core::kStageCount> predicted_s{};
-  double demand_m{};                        ///< Coarsest cell that the space allows: min((g_avg - width) / 2, d_obs).
+  double demand_m{};                        ///< Coarsest cell that the space allows: min((g_avg - width) / 4, d_obs / 2).
 };
 
 /// One instance a vehicle. RT-safe: O(1), no allocation.

@@ -48,9 +48,9 @@ double affordable(double time_s, double slope, double most) noexcept {
 bool better(const SolverSolution& a, const SolverSolution& b) noexcept {
   if (std::fabs(a.objective_s2 - b.objective_s2) > kSameObjective_s2) return a.objective_s2 < b.objective_s2;
   if (std::fabs(a.v0_m3 - b.v0_m3) > kSameVolume_m3) return a.v0_m3 > b.v0_m3;
+  if (std::fabs(a.v2_m3 - b.v2_m3) > kSameVolume_m3) return a.v2_m3 > b.v2_m3;
   if (a.p0_level != b.p0_level) return a.p0_level < b.p0_level;
   if (a.p1_level != b.p1_level) return a.p1_level < b.p1_level;
-  if (std::fabs(a.v2_m3 - b.v2_m3) > kSameVolume_m3) return a.v2_m3 > b.v2_m3;
   return a.v1_m3 > b.v1_m3;
 }
 

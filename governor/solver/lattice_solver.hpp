@@ -54,8 +54,8 @@ struct SolverSolution {
 ///   minimise (delta_d - sum latency_i(p_i, v_i))^2  subject to  sum latency_i <= delta_d,
 ///   g_min <= p0 <= min(p1, g_avg, d_obs);  0 <= v0 <= v1 <= min(v_sensor, v_map);  p1 = p2;  p on the lattice;  caps on v.
 /// For a fixed pair (p0, p1) latency is linear in the volumes, so all pairs are solved in closed form. Total order where
-/// several points are optimal (objectives within 1e-12 s2 are equal): more perceived volume v0, then finer p0, finer p1,
-/// more v2, more v1. Hence perception sees all that the sensors deliver before it sees it finer.
+/// several points are optimal (objectives within 1e-12 s2 are equal): more perceived volume v0, then more planning volume
+/// v2, then finer p0, finer p1, more v1. What the space asks for is in the bounds of p0; beyond that, volume comes first.
 /// Empty interval for p0: the finer side wins (kEmptyPrecision). Infeasible: the coarsest allowed pair with zero volume,
 /// the quickest decision there is. NaN or negative distance and volume bounds count as 0, NaN time as 0.
 /// RT-safe: 21 pairs, no iteration.

@@ -11,6 +11,7 @@ namespace {
 constexpr std::size_t index(core::StageId id) noexcept { return static_cast<std::size_t>(id); }
 constexpr double kTrajectoryStep_s = 0.5;  // of the points that order the space by distance
 constexpr std::size_t kTrajectoryPoints = 32;
+constexpr double kCornerRoom_m = 0.25;
 
 }  // namespace
 
@@ -79,34 +80,42 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   const double from_s = seconds(in.now - in.committed->start_time);
   const bool committed_free = is_trajectory_free(view, *in.committed, from_s, config_.vehicle_radius_m, check_lookups);
 
-  stages::PlanRequest request;
-  request.start_W = start.p_W;
-  request.goal_W = in.goal_W;
-  request.bounds_W = config_.flight_bounds_W;
-  request.radius_m = r_m;
-  request.volume_m3 = point.v2_m3;
-  request.horizon_m = config_.horizon_m;
-  request.seed = in.seed;
-  core::VirtualBudget planner_budget = budget_of(core::StageId::kPlanner, out);
-  stages::PlanResult planned;
-  out.planner_status = planner_.plan(request, view, planner_budget, planned);
-  planned.work.level = point.p1_level;
-  planned.work.units += check_lookups;
-  charge(core::StageId::kPlanner, planned.work, out);
-  out.planned_to_goal = planned.reaches_goal;
-
+  // First with room for the smoother to cut corners, then as tight as the vehicle can fly.
   stages::SmoothResult smoothed;
-  if (planned.path_W.size() >= 2) {
-    stages::SmoothRequest smooth;
-    smooth.path_W = {planned.path_W.begin(), planned.path_W.size()};
-    smooth.start = start;
-    smooth.start_time = takes_over;
-    smooth.limits = {point.speed_limit_mps, config_.acceleration_mps2};
-    smooth.radius_m = out.planner_status == Status::kStartBlocked ? config_.vehicle_radius_m : r_m;
-    core::VirtualBudget smoother_budget = budget_of(core::StageId::kSmoother, out);
-    out.smoother_status = smoother_.smooth(smooth, view, smoother_budget, smoothed);
+  core::Work planner_work;
+  core::Work smoother_work;
+  planner_work.level = point.p1_level;
+  planner_work.units = check_lookups;
+  core::VirtualBudget planner_budget = budget_of(core::StageId::kPlanner, out);
+  core::UnlimitedBudget smoother_budget;
+  for (const double room_m : {kCornerRoom_m, 0.0}) {
+    stages::PlanRequest request;
+    request.start_W = start.p_W;
+    request.goal_W = in.goal_W;
+    request.bounds_W = config_.flight_bounds_W;
+    request.radius_m = r_m + room_m;
+    request.volume_m3 = std::max(point.v2_m3 - planner_work.volume_m3, 0.0);
+    request.horizon_m = config_.horizon_m;
+    request.seed = in.seed;
+    stages::PlanResult planned;
+    out.planner_status = planner_.plan(request, view, planner_budget, planned);
+    out.planned_to_goal = planned.reaches_goal;
+    planner_work.units += planned.work.units;
+    planner_work.volume_m3 += planned.work.volume_m3;
+    if (planned.path_W.size() >= 2) {
+      stages::SmoothRequest smooth;
+      smooth.path_W = {planned.path_W.begin(), planned.path_W.size()};
+      smooth.start = start;
+      smooth.start_time = takes_over;
+      smooth.limits = {point.speed_limit_mps, config_.acceleration_mps2};
+      smooth.radius_m = out.planner_status == Status::kStartBlocked ? config_.vehicle_radius_m : r_m;
+      out.smoother_status = smoother_.smooth(smooth, view, smoother_budget, smoothed);
+      smoother_work.units += smoothed.work.units;
+    }
+    if (out.smoother_status == Status::kOk) break;
   }
-  charge(core::StageId::kSmoother, smoothed.work, out);
+  charge(core::StageId::kPlanner, planner_work, out);
+  charge(core::StageId::kSmoother, smoother_work, out);
 
   if (out.smoother_status == Status::kOk) {
     out.kind = DecisionKind::kNew;

@@ -1,6 +1,5 @@
 #include "stages/perception/brick.hpp"
 
-#include <algorithm>
 #include <span>
 
 namespace roborun::stages {
@@ -8,8 +7,6 @@ namespace roborun::stages {
 void Brick::clear(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept {
   cell.fill(evidence::kUnknown);
   mip.fill(content::kUnknown);
-  coarse_hit.fill(0);
-  hit_scan = 0;
   x = bx;
   y = by;
   z = bz;
@@ -57,28 +54,9 @@ void Brick::add_free(int level, std::uint32_t morton) noexcept {
   dirty = true;
 }
 
-void Brick::add_hit(int level, std::uint32_t morton, std::uint32_t scan) noexcept {
+void Brick::add_hit(std::uint32_t morton) noexcept {
+  cell[morton] = evidence::after_hit(cell[morton]);
   dirty = true;
-  if (level == 0) {
-    cell[morton] = evidence::after_hit(cell[morton]);
-    return;
-  }
-  if (hit_scan != scan) {
-    coarse_hit.fill(0);
-    hit_scan = scan;
-  }
-  const std::size_t bit = mip_index(level, morton);
-  if (((coarse_hit[bit / 64] >> (bit % 64)) & 1U) != 0) return;
-  coarse_hit[bit / 64] |= std::uint64_t{1} << (bit % 64);
-
-  const std::size_t count = std::size_t{1} << (3U * static_cast<unsigned>(level));
-  const auto below = std::span(cell).subspan(morton * count, count);
-  const bool any_occupied = std::any_of(below.begin(), below.end(), [](std::int8_t v) { return v > 0; });
-  const bool any_unknown = std::find(below.begin(), below.end(), evidence::kUnknown) != below.end();
-  for (std::int8_t& value : below) {
-    const bool chosen = any_occupied ? value > 0 : (!any_unknown || value == evidence::kUnknown);
-    if (chosen) value = evidence::after_hit(value);
-  }
 }
 
 }  // namespace roborun::stages

@@ -42,8 +42,6 @@ inline constexpr std::uint8_t kFree = 4;  ///< An entry that equals kFree is fre
 struct Brick {
   std::array<std::int8_t, kCellsPerBrick> cell{};          ///< Level 0, Morton order: the truth.
   std::array<std::uint8_t, 512 + 64 + 8 + 1> mip{};        ///< Levels 1 to 4, derived by refresh().
-  std::array<std::uint64_t, 10> coarse_hit{};              ///< Coarse cells already hit in scan `hit_scan`.
-  std::uint32_t hit_scan{};
   std::int32_t x{}, y{}, z{};                              ///< Position in bricks from the map's corner.
   std::uint16_t known_count{};                             ///< Cells that are not unknown.
   bool dirty{};                                            ///< Cells changed since refresh().
@@ -55,10 +53,8 @@ struct Brick {
   [[nodiscard]] std::uint8_t flags(int level, std::uint32_t morton) const noexcept;
   /// Free evidence for all cells below (level, morton).
   void add_free(int level, std::uint32_t morton) noexcept;
-  /// A surface somewhere in the cell (level, morton). Level 0: that cell is hit. Coarser: occupied cells below it are
-  /// confirmed; if there are none, its unknown cells become occupied; if there are none either, all of them.
-  /// At levels above 0 a second hit in the same scan changes nothing.
-  void add_hit(int level, std::uint32_t morton, std::uint32_t scan) noexcept;
+  /// A surface in this cell of level 0.
+  void add_hit(std::uint32_t morton) noexcept;
 };
 
 /// Index of an entry in Brick::mip; level 1 .. 4.

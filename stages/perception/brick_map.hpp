@@ -1,8 +1,10 @@
 /// The occupancy map of the project: bricks on the precision lattice, in fixed memory.
 ///
 /// Free space is found projectively, coarse to fine: a block all of whose pixels see past it is free at once, a block
-/// behind the surface is left alone, the rest is divided until cells of p0. Surfaces are the pixels' end points. Free
-/// evidence is written first, surfaces after it, so that a look past a cell never erases a surface seen in the same scan.
+/// behind the surface is left alone, the rest is divided until cells of p0. Surfaces are the pixels' end points, always
+/// written at the finest level: that costs no more, and what a coarse block around them hides stays unknown, hence not
+/// free, until a finer look clears it. Free evidence is written first, surfaces after it, so that a look past a cell never
+/// erases a surface seen in the same scan.
 #pragma once
 
 #include <array>
@@ -108,7 +110,6 @@ class BrickMap final : public OccupancyMap, private MapView {
   bool complete_{false};                ///< Every camera of the vehicle contributed to this scan.
   std::array<std::optional<DepthPyramid>, 8> pyramid_{};
   std::uint64_t known_cells_{0};
-  std::uint32_t scan_{0};
   Vector3 vehicle_W_ = Vector3::Zero();
   int view_level_{0};
   double view_radius_m_{0.0};           ///< Bricks whose centre is farther from view_center_W_ are unknown.

@@ -192,7 +192,6 @@ bool BrickMap::clear_brick(std::uint32_t position, const IntegrationRequest& req
 }
 
 void BrickMap::add_surfaces(const IntegrationRequest& request, double reach_m, core::Work& work) noexcept {
-  const int level = std::min(request.level, kBrickLevel);
   for (std::size_t i = 0; i < camera_count_; ++i) {
     const PosedDepthFrame& posed = request.frames[frame_of_[i]];
     const firmware_if::DepthFrame& frame = posed.frame;
@@ -211,8 +210,8 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, double reach_m, c
         if (order_key_[slot_of(bx, by, bz)] * kOrderStep_m > reach_m) continue;
         Brick* brick = touch(bx, by, bz);
         if (brick == nullptr) continue;
-        const auto inside = [level](std::int32_t c) { return static_cast<std::uint32_t>(c & (kBrickCells - 1)) >> static_cast<unsigned>(level); };
-        brick->add_hit(level, morton3(inside(cell.x), inside(cell.y), inside(cell.z)), scan_);
+        const auto inside = [](std::int32_t c) { return static_cast<std::uint32_t>(c & (kBrickCells - 1)); };
+        brick->add_hit(morton3(inside(cell.x), inside(cell.y), inside(cell.z)));
         ++work.units;
       }
     }
@@ -242,7 +241,6 @@ Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget&
   result.work.level = std::clamp(request.level, 0, kPrecisionLevels - 1);
   if (usable_frames(request, result) == 0 || request.trajectory_W.empty()) return Status::kInvalidArgument;
   ++counters_.scans;
-  ++scan_;
   vehicle_W_ = camera_[0].p_WC;
   const std::size_t count = order_bricks(request);
   Status status = Status::kOk;

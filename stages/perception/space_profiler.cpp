@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kSectors = 72;
+constexpr double kSameObstacle_m = 3.0;
 
 struct Sector {
   double range_m{kInfinity};
@@ -38,11 +39,14 @@ void profile_gaps(const SpaceProfilerConfig& config, std::span<const CloudPoint>
   if (first != sector.end()) {
     const auto begin = static_cast<std::size_t>(first - sector.begin());
     Sector last = *first;
+    std::size_t last_at = 0;
     for (std::size_t i = 1; i <= kSectors; ++i) {
       const Sector& s = sector[(begin + i) % kSectors];
       if (s.range_m == kInfinity) continue;
       const double gap_m = distance_m(last, s);
-      if (gap_m >= config.vehicle_width_m && gap_m <= config.widest_gap_m) {
+      const bool same_obstacle = i - last_at == 1 && std::fabs(s.range_m - last.range_m) < kSameObstacle_m;
+      last_at = i;
+      if (!same_obstacle && gap_m >= config.vehicle_width_m && gap_m <= config.widest_gap_m) {
         sum_m += gap_m;
         ++count;
         profile.gap_min_m = std::fmin(profile.gap_min_m, gap_m);

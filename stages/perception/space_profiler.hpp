@@ -20,9 +20,9 @@ struct SpaceProfilerConfig {
   double max_visible_m{25.0};    ///< The range of the cameras.
 };
 
-/// Gaps: the points in the height band are sorted into 5 degree sectors (nearest point each); neighbouring sectors whose
-/// nearest points are closer to each other than the vehicle is wide belong to one obstacle; a gap is the distance between
-/// the facing edges of neighbouring obstacles, all around. No gap: +infinity.
+/// Gaps: the points in the height band are sorted into 72 sectors of 5 degrees, the nearest point of each kept.
+/// Neighbouring sectors whose ranges differ by less than 3 m show one obstacle; between all others there is a gap: the
+/// distance of their points, counted if the vehicle fits through and it is not wider than widest_gap_m. None: +infinity.
 /// Closest obstacle: nearest point within `relevant_W` (where the vehicle may be, grown by its radius), +infinity if none.
 /// Closest unknown: free distance in `view` ahead along v_WB, at rest towards goal_W; at most max_visible_m.
 /// Outlook: up to 32 samples of the trajectory from `now` to its end, each with the free distance along its motion there.

@@ -274,23 +274,35 @@ Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, c
     out = Trajectory::hold(start.p_W, start_time);
     return Status::kOk;
   }
-  const double limit_mps2 = std::max(limits.acceleration_mps2, start.a_W.norm()) * kLimitTolerance;
-  Trajectory candidate;
-  candidate.start_time = start_time;
-  Plan plan;
-  plan.count = 2;
-  plan.knot_W[0] = start.p_W;
-  double time_s = std::max(1.2 * speed_mps / limits.acceleration_mps2, 0.3);
-  for (int round = 0; round < 16; ++round, time_s *= 1.15) {
-    plan.knot_W[1] = start.p_W + 0.5 * time_s * start.v_W + (time_s * time_s / 12.0) * start.a_W;
-    plan.time_s[1] = time_s;
-    if (!solve(plan, start, candidate)) continue;
-    double worst_mps2 = 0.0;
-    for (int i = 1; i < 2 * kSamples; ++i) worst_mps2 = std::max(worst_mps2, candidate.at_s(time_s * i / (2.0 * kSamples)).a_W.norm());
-    if (worst_mps2 <= limit_mps2) break;
+  // From the full state if that stays within the limit; otherwise with a step in jerk, at last in acceleration: the vehicle
+  // follows such a reference with a small error, and a wild one not at all.
+  Trajectory best;
+  double best_mps2 = 1e300;
+  const double limit_mps2 = limits.acceleration_mps2 * kLimitTolerance;
+  TrajectoryPoint from = start;
+  for (int attempt = 0; attempt < 3 && best_mps2 > limit_mps2; ++attempt) {
+    if (attempt >= 1) from.j_W.setZero();
+    if (attempt >= 2) from.a_W.setZero();
+    Trajectory candidate;
+    candidate.start_time = start_time;
+    Plan plan;
+    plan.count = 2;
+    plan.knot_W[0] = from.p_W;
+    double time_s = std::max(1.2 * speed_mps / limits.acceleration_mps2, 0.3);
+    for (int round = 0; round < 8; ++round, time_s *= 1.15) {
+      plan.knot_W[1] = from.p_W + 0.5 * time_s * from.v_W + (time_s * time_s / 12.0) * from.a_W;
+      plan.time_s[1] = time_s;
+      if (!solve(plan, from, candidate)) continue;
+      double worst_mps2 = 0.0;
+      for (int i = 0; i < 2 * kSamples; ++i) worst_mps2 = std::max(worst_mps2, candidate.at_s(time_s * i / (2.0 * kSamples)).a_W.norm());
+      if (worst_mps2 >= best_mps2) continue;
+      best_mps2 = worst_mps2;
+      best = candidate;
+      if (worst_mps2 <= limit_mps2) break;
+    }
   }
-  candidate.brake_begin_s = 0.0;
-  out = candidate;
+  best.brake_begin_s = 0.0;
+  out = best;
   return Status::kOk;
 }
 
