@@ -13,6 +13,8 @@ constexpr double kVisitedCell_m3 = kVisitedCell_m * kVisitedCell_m * kVisitedCel
 constexpr double kGoalBias = 0.15;
 constexpr double kShortEdge_m = 0.3;  // a node nearer than this to another adds nothing
 constexpr double kEscape_m = 2.0;
+constexpr double kLookAhead_m = 12.0;   // beyond a path's end
+constexpr double kDetour_m = 10.0;      // what a surface right ahead of a path's end costs: the way around a pillar
 
 Vector3 towards_goal(const PlanRequest& request) noexcept {
   const Vector3 way = request.goal_W - request.start_W;
@@ -27,6 +29,23 @@ RrtStar::RrtStar(const Config& config, core::Arena& arena) noexcept
 
 double RrtStar::promise_m(const Node& node, const Vector3& goal_W) const noexcept {
   return node.cost_m + kUnknownWeight * (goal_W - node.p_W).norm();
+}
+
+double RrtStar::detour_m(const PlanRequest& request, const MapView& view, const Vector3& p_W, std::uint64_t& lookups) const noexcept {
+  const Vector3 way = request.goal_W - p_W;
+  const double distance_m = way.norm();
+  if (distance_m < kShortEdge_m) return 0.0;
+  const Vector3 ahead = way / distance_m;
+  const Vector3 side = request.radius_m * Vector3(-ahead.y(), ahead.x(), 0.0);
+  const double reach_m = std::fmin(kLookAhead_m, distance_m);
+  const double step_m = std::fmax(2.0 * kFinestCell_m, 0.5 * view.cell_m());
+  for (double at_m = request.radius_m; at_m < reach_m; at_m += step_m) {
+    for (const double share : {-1.0, 0.0, 1.0}) {
+      if (view.at(p_W + at_m * ahead + share * side, lookups) != CellState::kOccupied) continue;
+      return kDetour_m * (1.0 - at_m / kLookAhead_m);
+    }
+  }
+  return 0.0;
 }
 
 Vector3 RrtStar::sample(const PlanRequest& request, core::CounterRng& rng) const noexcept {
@@ -206,7 +225,8 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::Stag
 
   core::CounterRng rng(request.seed, 7);
   Status status = Status::kOk;
-  double best_m = promise_m(node_[static_cast<std::size_t>(best)], request.goal_W);
+  double best_m = promise_m(node_[static_cast<std::size_t>(best)], request.goal_W) +
+                  detour_m(request, view, node_[static_cast<std::size_t>(best)].p_W, work.units);
   double mark_m = best_m;
   std::uint32_t mark = 0;
   for (std::uint32_t i = 0; i < config_.max_samples && count_ < node_.size(); ++i) {
@@ -220,7 +240,8 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::Stag
     const std::size_t before = count_;
     try_extend(request, view, sample_W, work);
     if (count_ > before) {
-      const double promise = promise_m(node_[count_ - 1], request.goal_W);
+      double promise = promise_m(node_[count_ - 1], request.goal_W);
+      if (promise < best_m) promise += detour_m(request, view, node_[count_ - 1].p_W, work.units);
       if (promise < best_m) {
         best_m = promise;
         best = static_cast<std::int32_t>(count_ - 1);
@@ -246,7 +267,7 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::Stag
   }
 
   // Better than standing still by at least one cell of the view.
-  const double stay_m = promise_m(node_[0], request.goal_W);
+  const double stay_m = promise_m(node_[0], request.goal_W) + detour_m(request, view, request.start_W, work.units);
   if (best == 0 || best_m > stay_m - view.cell_m()) return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
   extract(request, view, best, result);
   if (result.path_W.size() < 2) return Status::kNoPath;

@@ -14,7 +14,8 @@
 namespace roborun::stages {
 
 /// The tree grows from the start through known free space only. The goal is most often far outside, so the answer is the
-/// node of least (cost to come + kUnknownWeight * straight distance to the goal), ties by index, then shortened.
+/// node of least (cost to come + kUnknownWeight * straight distance to the goal + up to 10 m if a surface stands in the way
+/// there), ties by index, then shortened.
 /// Open space costs nothing: if the straight way to the goal (or to the horizon) is free, that is the answer.
 class RrtStar final : public Planner {
  public:
@@ -58,6 +59,8 @@ class RrtStar final : public Planner {
   [[nodiscard]] std::size_t neighbours_of(const Vector3& p_W, double radius_m, std::array<Neighbour, kNeighbours>& found) const noexcept;
   void add_node(const Vector3& p_W, std::int32_t parent, double cost_m, core::Work& work) noexcept;
   [[nodiscard]] double promise_m(const Node& node, const Vector3& goal_W) const noexcept;
+  /// What the first surface on the straight way on to the goal will cost, 0 if none is known within 12 m.
+  [[nodiscard]] double detour_m(const PlanRequest& request, const MapView& view, const Vector3& p_W, std::uint64_t& lookups) const noexcept;
   void extract(const PlanRequest& request, const MapView& view, std::int32_t node, PlanResult& result) noexcept;
   [[nodiscard]] Status escape(const PlanRequest& request, const MapView& view, PlanResult& result) const noexcept;
 

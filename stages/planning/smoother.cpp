@@ -17,7 +17,7 @@ using Block = Eigen::Matrix<double, 4, 3>;
 constexpr double kSameWaypoint_m = 0.25;
 constexpr double kMinSegment_s = 0.15;
 constexpr double kProfileShare = 0.60;   // of the acceleration limit: the curve around the profile needs the rest
-constexpr double kCornerCut_m = 0.6;     // how far a corner may be cut
+constexpr double kCornerCut_m = 0.3;     // how far a corner may be cut: the planner leaves about so much room
 constexpr double kLimitTolerance = 1.05;
 constexpr int kSamples = 12;             // per segment, for the limits
 constexpr int kStretchRounds = 10;
@@ -186,8 +186,8 @@ bool Smoother::solve(const Plan& plan, const TrajectoryPoint& start, Trajectory&
 }
 
 bool Smoother::stretch_to_limits(Plan& plan, const SmoothRequest& request, const MotionLimits& limits, Trajectory& out) const noexcept {
-  const double speed_limit = std::max(limits.speed_mps, request.start.v_W.norm()) * kLimitTolerance + 0.05;
-  const double acceleration_limit = std::max(limits.acceleration_mps2, request.start.a_W.norm()) * kLimitTolerance + 0.05;
+  const double speed_limit = std::max(limits.speed_mps * kLimitTolerance, request.start.v_W.norm() + 0.01);
+  const double acceleration_limit = std::max(limits.acceleration_mps2 * kLimitTolerance, request.start.a_W.norm() + 0.01);
   for (int round = 0; round < kStretchRounds; ++round) {
     if (!solve(plan, request.start, out)) return false;
     bool fine = true;
