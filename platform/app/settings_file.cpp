@@ -1,0 +1,69 @@
+#include "platform/app/settings_file.hpp"
+
+#include <fstream>
+#include <iterator>
+
+#include "platform/sitl/world/toml_reader.hpp"
+
+namespace roborun::app {
+namespace {
+
+struct Range {
+  double low;
+  double high;
+};
+
+/// A number within [low, high] into `value`, if the key is there.
+void read(const sitl::TomlReader& reader, const toml::table& table, const char* key, Range range, double& value) {
+  const toml::node* node = table.get(key);
+  if (node == nullptr) return;
+  const auto raw = node->is_integer() || node->is_floating_point() ? node->value<double>() : std::nullopt;
+  if (!raw || !(*raw >= range.low && *raw <= range.high)) reader.refuse(*node, key, fmt::format("must be a number from {} to {}", range.low, range.high));
+  value = *raw;
+}
+
+const toml::table* section(const sitl::TomlReader& reader, const toml::table& root, const char* name, const std::set<std::string_view>& keys) {
+  const toml::node* node = root.get(name);
+  if (node == nullptr) return nullptr;
+  if (node->as_table() == nullptr) reader.refuse(*node, name, fmt::format("must be a table: [{}]", name));
+  reader.allow_keys(*node->as_table(), fmt::format("[{}]", name), keys);
+  return node->as_table();
+}
+
+}  // namespace
+
+void load_settings(const std::string& path, MissionConfig& config) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw sitl::InputError(fmt::format("{}: cannot be opened: must be a readable TOML file", path));
+  const toml::table root = sitl::parse_toml(path, std::string(std::istreambuf_iterator<char>(file), {}));
+  const sitl::TomlReader reader(path);
+  reader.allow_keys(root, "the file", {"camera", "wind", "battery", "flight"});
+
+  if (const toml::table* t = section(reader, root, "camera", {"pixels", "range_m", "rate_Hz", "latency_s", "noise_m", "noise_per_m", "pixel_dropout_ratio", "frame_dropout_ratio"})) {
+    sitl::DepthCameraConfig& c = config.camera;
+    double pixels = c.pixels;
+    read(reader, *t, "pixels", {8, 512}, pixels);
+    c.pixels = static_cast<std::uint16_t>(pixels);
+    read(reader, *t, "range_m", {5, 100}, c.range_m);
+    read(reader, *t, "rate_Hz", {1, 100}, c.rate_Hz);
+    read(reader, *t, "latency_s", {0, 0.4}, c.latency_s);
+    read(reader, *t, "noise_m", {0, 1}, c.noise_m);
+    read(reader, *t, "noise_per_m", {0, 0.1}, c.noise_per_m);
+    read(reader, *t, "pixel_dropout_ratio", {0, 1}, c.pixel_dropout_ratio);
+    read(reader, *t, "frame_dropout_ratio", {0, 1}, c.frame_dropout_ratio);
+  }
+  if (const toml::table* t = section(reader, root, "wind", {"mean_mps", "gust_mps"})) {
+    if (const toml::node* mean = t->get("mean_mps")) {
+      config.wind.mean_W_mps = reader.point(*mean, "mean_mps");
+      if (config.wind.mean_W_mps.norm() > 20.0) reader.refuse(*mean, "mean_mps", "must be at most 20 m/s");
+    }
+    read(reader, *t, "gust_mps", {0, 10}, config.wind.gust_mps);
+  }
+  if (const toml::table* t = section(reader, root, "battery", {"capacity_J"})) read(reader, *t, "capacity_J", {1e3, 1e9}, config.vehicle.battery_J);
+  if (const toml::table* t = section(reader, root, "flight", {"v_max_mps", "time_limit_s"})) {
+    read(reader, *t, "v_max_mps", {0.5, 12}, config.v_max_mps);
+    read(reader, *t, "time_limit_s", {1, 100000}, config.time_limit_s);
+  }
+}
+
+}  // namespace roborun::app

@@ -1,0 +1,171 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "platform/sitl/world/input_error.hpp"
+#include "platform/sitl/world/world_file.hpp"
+
+namespace roborun::sitl {
+namespace {
+
+constexpr int kDepth = 16;
+constexpr double kMaxVoxels = 4e9;  // bits of the dense grid: 512 MB
+
+struct Leaf {
+  std::array<std::int64_t, 3> first;
+  std::int64_t size;
+};
+
+struct Header {
+  std::size_t data{};
+  double resolution_m{};
+};
+
+[[noreturn]] void refuse(const std::string& name, const std::string& what) { throw InputError(fmt::format("{}: {}", name, what)); }
+
+Header parse_header(std::span<const unsigned char> bytes, bool full, const std::string& name) {
+  const std::string magic = full ? "# Octomap OcTree file" : "# Octomap OcTree binary file";
+  const auto line_at = [&](std::size_t& at) {
+    std::string line;
+    while (at < bytes.size() && bytes[at] != '\n' && line.size() < 512) line.push_back(static_cast<char>(bytes[at++]));
+    if (at >= bytes.size() || bytes[at] != '\n') refuse(name, "truncated OctoMap header: must hold id, size, res and data lines");
+    ++at;
+    return line;
+  };
+  std::size_t at = 0;
+  if (line_at(at).rfind(magic, 0) != 0) refuse(name, fmt::format("not an OctoMap file: line 1 must be '{}'", magic));
+  Header header;
+  bool id_ok = false;
+  for (int i = 0; i < 64; ++i) {
+    const std::string line = line_at(at);
+    if (line == "data") {
+      header.data = at;
+      if (!id_ok) refuse(name, "OctoMap header without 'id OcTree'");
+      if (!(header.resolution_m >= 0.001 && header.resolution_m <= 100.0)) refuse(name, "OctoMap header: res must be 0.001 .. 100 m");
+      return header;
+    }
+    if (line.rfind("id ", 0) == 0) {
+      if (line != "id OcTree") refuse(name, fmt::format("OctoMap tree of type '{}': only OcTree is read", line.substr(3)));
+      id_ok = true;
+    } else if (line.rfind("res ", 0) == 0) {
+      header.resolution_m = std::strtod(line.c_str() + 4, nullptr);
+    }
+  }
+  refuse(name, "OctoMap header too long: no 'data' line");
+}
+
+/// Walks the tree in file order with an explicit stack and calls leaf(first, size, occupied).
+template <typename LeafFunction>
+void walk(std::span<const unsigned char> data, bool full, const std::string& name, LeafFunction&& on_leaf) {
+  struct Frame {
+    std::array<std::int64_t, 3> first;
+    int depth;
+    unsigned children;  // .bt: two bits a child; .ot: one bit a child
+    unsigned next;
+  };
+  std::size_t at = 0;
+  const auto need = [&](std::size_t count) {
+    if (data.size() - at < count) refuse(name, fmt::format("truncated OctoMap data at byte {}", at));
+  };
+  float value = 0.0F;
+  const auto read_node = [&](unsigned& children) {
+    if (full) {
+      need(5);
+      std::memcpy(&value, data.data() + at, 4);
+      children = data[at + 4];
+      at += 5;
+    } else {
+      need(2);
+      children = static_cast<unsigned>(data[at]) | (static_cast<unsigned>(data[at + 1]) << 8U);
+      at += 2;
+    }
+  };
+  std::array<Frame, kDepth + 1> stack{};
+  int top = 0;
+  unsigned root = 0;
+  if (data.empty()) return;
+  read_node(root);
+  stack[0] = {{0, 0, 0}, 0, root, 0};
+  if (full && root == 0) on_leaf(Leaf{{0, 0, 0}, std::int64_t{1} << kDepth}, value > 0.0F);
+  while (top >= 0) {
+    Frame& frame = stack[static_cast<std::size_t>(top)];
+    if (frame.next == 8 || (full && frame.children == 0)) {
+      --top;
+      continue;
+    }
+    const unsigned child = frame.next++;
+    const int depth = frame.depth + 1;
+    const std::int64_t size = std::int64_t{1} << (kDepth - depth);
+    const std::array<std::int64_t, 3> first{frame.first[0] + ((child & 1U) != 0 ? size : 0),
+                                            frame.first[1] + ((child & 2U) != 0 ? size : 0),
+                                            frame.first[2] + ((child & 4U) != 0 ? size : 0)};
+    if (full) {
+      if (((frame.children >> child) & 1U) == 0) continue;
+      if (depth > kDepth) refuse(name, "OctoMap data deeper than 16 levels");
+      unsigned children = 0;
+      read_node(children);
+      if (children == 0) {
+        on_leaf(Leaf{first, size}, value > 0.0F);
+        continue;
+      }
+      if (depth == kDepth) refuse(name, "OctoMap data deeper than 16 levels");
+      stack[static_cast<std::size_t>(++top)] = {first, depth, children, 0};
+      continue;
+    }
+    // .bt: all children of a node come before any grandchild in the bits, but depth first in the file.
+    switch ((frame.children >> (2U * child)) & 3U) {
+      case 0U: break;                                     // unknown
+      case 1U: on_leaf(Leaf{first, size}, false); break;  // free (bit order: low bit first)
+      case 2U: on_leaf(Leaf{first, size}, true); break;   // occupied
+      default: {
+        if (depth >= kDepth) refuse(name, "OctoMap data deeper than 16 levels");
+        unsigned children = 0;
+        read_node(children);
+        stack[static_cast<std::size_t>(++top)] = {first, depth, children, 0};
+      }
+    }
+  }
+  if (at != data.size()) refuse(name, fmt::format("{} bytes after the end of the OctoMap tree", data.size() - at));
+}
+
+}  // namespace
+
+VoxelGrid parse_octomap(std::span<const unsigned char> bytes, bool full, const std::string& name) {
+  const Header header = parse_header(bytes, full, name);
+  const auto data = bytes.subspan(header.data);
+  // Two walks: first the extent, then the voxels. Nothing is stored in between.
+  constexpr std::int64_t kCentre = std::int64_t{1} << (kDepth - 1);
+  std::array<std::int64_t, 3> low{1 << kDepth, 1 << kDepth, 1 << kDepth};
+  std::array<std::int64_t, 3> high{0, 0, 0};
+  std::size_t leaves = 0;
+  walk(data, full, name, [&](const Leaf& leaf, bool) {
+    ++leaves;
+    for (std::size_t i = 0; i < 3; ++i) {
+      low[i] = std::min(low[i], leaf.first[i]);
+      high[i] = std::max(high[i], leaf.first[i] + leaf.size);
+    }
+  });
+  if (leaves == 0) refuse(name, "the OctoMap tree is empty: no leaf is known");
+  std::array<std::int64_t, 3> count{};
+  double voxels = 1.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    count[i] = high[i] - low[i];
+    voxels *= static_cast<double>(count[i]);
+  }
+  if (voxels > kMaxVoxels) refuse(name, fmt::format("the box around all leaves has {:.3g} voxels: at most {:.0e}", voxels, kMaxVoxels));
+  const Vector3 min_W = header.resolution_m * Vector3(static_cast<double>(low[0] - kCentre), static_cast<double>(low[1] - kCentre),
+                                                      static_cast<double>(low[2] - kCentre));
+  VoxelGrid grid(min_W, header.resolution_m, count);
+  walk(data, full, name, [&](const Leaf& leaf, bool occupied) {
+    if (occupied) grid.fill({leaf.first[0] - low[0], leaf.first[1] - low[1], leaf.first[2] - low[2]}, leaf.size);
+  });
+  return grid;
+}
+
+}  // namespace roborun::sitl

@@ -1,0 +1,23 @@
+/// The baseline map: stock OctoMap with the stock insertion, behind the interface of the own map.
+/// Allocates: it lives outside the flight loop, in a target of its own.
+#pragma once
+
+#include <memory>
+
+#include "core/geometry/vector.hpp"
+#include "stages/perception/occupancy_map.hpp"
+
+namespace roborun::stages {
+
+struct OctomapConfig {
+  Aabb bounds_W{};            ///< Space outside is never stored: unknown.
+  double view_reach_m{30.0};  ///< Half the side of the exported window.
+};
+
+/// One stock octomap::OcTree for each precision; a scan at p0 goes into the tree of that resolution by insertPointCloud()
+/// of the p0-grid-averaged cloud (pixels without a return clear up to the range). A place is what the finest tree that
+/// knows it says. The export copies the window around the vehicle into cells of p1, as stock users do.
+/// nullptr if memory is short. The library's exceptions end here.
+[[nodiscard]] std::unique_ptr<OccupancyMap> make_octomap_backend(const OctomapConfig& config) noexcept;
+
+}  // namespace roborun::stages
