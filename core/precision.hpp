@@ -1,4 +1,5 @@
-/// The power-of-two precision lattice: cell sizes 0.3 m * 2^level. Source: RoboRun Table "Knob values", Eq. 3.
+/// The power-of-two precision lattice: cell sizes 0.3 m * 2^level. Source: RoboRun Table "Knob values",
+/// Eq. 3.
 #pragma once
 
 namespace roborun {
@@ -12,7 +13,8 @@ inline constexpr int kPrecisionLevels = 6;    ///< 0.3, 0.6, 1.2, 2.4, 4.8, 9.6 
   return kFinestCell_m * static_cast<double>(1 << clamped);
 }
 
-/// The coarsest level whose cell is not larger than size_m; 0 if even the finest is, and for NaN. RT-safe: O(1).
+/// The coarsest level whose cell is not larger than size_m; 0 if even the finest is, and for NaN. RT-safe:
+/// O(1).
 [[nodiscard]] constexpr int coarsest_level_within(double size_m) noexcept {
   int level = 0;
   while (level + 1 < kPrecisionLevels && cell_size_m(level + 1) <= size_m) ++level;

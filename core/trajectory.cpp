@@ -15,13 +15,9 @@ double Trajectory::duration_s() const noexcept {
   return total_s;
 }
 
-Vector3 Trajectory::end_W() const noexcept {
-  return segment_count == 0 ? hold_W : at_s(duration_s()).p_W;
-}
+Vector3 Trajectory::end_W() const noexcept { return segment_count == 0 ? hold_W : at_s(duration_s()).p_W; }
 
-TrajectoryPoint Trajectory::at(MonotonicTime time) const noexcept {
-  return at_s(seconds(time - start_time));
-}
+TrajectoryPoint Trajectory::at(MonotonicTime time) const noexcept { return at_s(seconds(time - start_time)); }
 
 TrajectoryPoint Trajectory::at_s(double time_s) const noexcept {
   TrajectoryPoint point;

@@ -32,15 +32,16 @@ struct PolynomialSegment {
   }
 };
 
-/// Piecewise polynomial, continuous up to snap, at rest at its end. Before start_time it stays at its first point,
-/// after its end at its last point, in both cases with all derivatives zero.
-/// Empty (segment_count == 0): "hold" at hold_W.
+/// Piecewise polynomial, continuous up to snap, at rest at its end. Before start_time it stays at its first
+/// point, after its end at its last point, in both cases with all derivatives zero. Empty (segment_count ==
+/// 0): "hold" at hold_W.
 class Trajectory {
  public:
   static constexpr std::size_t kMaxSegments = 48;
 
   MonotonicTime start_time{};
-  double brake_begin_s{};  ///< From start_time: where the final braking tail begins; duration_s() if there is none.
+  double brake_begin_s{};  ///< From start_time: where the final braking tail begins; duration_s() if there is
+                           ///< none.
   std::size_t segment_count{};
   std::array<PolynomialSegment, kMaxSegments> segment{};
   Vector3 hold_W = Vector3::Zero();

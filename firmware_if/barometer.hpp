@@ -14,7 +14,8 @@ struct BarometerSample {
   double altitude_m{};  ///< Above the world origin, from pressure; drifts.
 };
 
-/// Contract: read() neither blocks nor allocates; kOk hands out the oldest sample not yet read, kNotReady: none.
+/// Contract: read() neither blocks nor allocates; kOk hands out the oldest sample not yet read, kNotReady:
+/// none.
 class Barometer {
  public:
   virtual ~Barometer() = default;

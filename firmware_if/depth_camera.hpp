@@ -35,7 +35,8 @@ struct CameraMount {
 
 /// Contract:
 ///  1. read() neither blocks nor allocates.
-///  2. kOk hands out the newest frame, which stays valid until the next read(); the same frame is never handed out
+///  2. kOk hands out the newest frame, which stays valid until the next read(); the same frame is never
+///  handed out
 ///     twice: then, and before the first one, the answer is kNotReady.
 class DepthCamera {
  public:

@@ -14,8 +14,8 @@ struct GnssFix {
   std::uint32_t sequence{};
   std::array<double, 3> p_WB_m{};    ///< World frame ENU, local origin.
   std::array<double, 3> v_WB_mps{};  ///< World frame ENU.
-  double heading_rad{};              ///< Yaw of the body x axis from East, counter-clockwise; NaN: not available.
-  double sigma_horizontal_m{};       ///< One standard deviation, as the receiver states it.
+  double heading_rad{};         ///< Yaw of the body x axis from East, counter-clockwise; NaN: not available.
+  double sigma_horizontal_m{};  ///< One standard deviation, as the receiver states it.
   double sigma_vertical_m{};
   double sigma_speed_mps{};
   double sigma_heading_rad{};

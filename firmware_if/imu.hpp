@@ -12,11 +12,12 @@ namespace roborun::firmware_if {
 struct ImuSample {
   MonotonicTime stamp{};
   std::uint32_t sequence{};
-  std::array<double, 3> angular_rate_B_radps{};    ///< Body frame FLU.
-  std::array<double, 3> specific_force_B_mps2{};   ///< Acceleration minus gravity; (0, 0, +9.81) at rest.
+  std::array<double, 3> angular_rate_B_radps{};   ///< Body frame FLU.
+  std::array<double, 3> specific_force_B_mps2{};  ///< Acceleration minus gravity; (0, 0, +9.81) at rest.
 };
 
-/// Contract: read() neither blocks nor allocates; kOk hands out the oldest sample not yet read, kNotReady: none.
+/// Contract: read() neither blocks nor allocates; kOk hands out the oldest sample not yet read, kNotReady:
+/// none.
 class Imu {
  public:
   virtual ~Imu() = default;

@@ -8,8 +8,9 @@
 
 namespace roborun::firmware_if {
 
-/// Thrust ratio of each motor, 0 = stopped, 1 = full thrust. Order: front left, front right, rear left, rear right.
-/// Front left and rear right turn clockwise seen from above (their reaction torque yaws the body counter-clockwise).
+/// Thrust ratio of each motor, 0 = stopped, 1 = full thrust. Order: front left, front right, rear left, rear
+/// right. Front left and rear right turn clockwise seen from above (their reaction torque yaws the body
+/// counter-clockwise).
 struct MotorCommand {
   std::array<double, 4> thrust_ratio{};
 };

@@ -8,8 +8,8 @@ namespace roborun {
 
 using Nanos = std::chrono::duration<std::int64_t, std::nano>;
 
-/// A clock that only moves forward. It has no now(): time is read from firmware_if::Clock, so that simulation,
-/// replay and flight run the same code. The epoch is the start of the run.
+/// A clock that only moves forward. It has no now(): time is read from firmware_if::Clock, so that
+/// simulation, replay and flight run the same code. The epoch is the start of the run.
 struct MonotonicEpoch {
   using duration = Nanos;
   using rep = duration::rep;

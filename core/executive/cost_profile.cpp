@@ -7,21 +7,25 @@ namespace roborun::core {
 Nanos CostProfile::cost(StageId id, const Work& work) const noexcept {
   const StageCost& c = of(id);
   const auto level = static_cast<std::size_t>(std::clamp(work.level, 0, kPrecisionLevels - 1));
-  const double total_s =
-      c.fixed_s[level] + static_cast<double>(work.units) * c.per_unit_s + std::max(work.volume_m3, 0.0) * c.per_m3_s[level];
+  const double total_s = c.fixed_s[level] + static_cast<double>(work.units) * c.per_unit_s +
+                         std::max(work.volume_m3, 0.0) * c.per_m3_s[level];
   return from_seconds(std::max(total_s, 0.0));
 }
 
 CostProfile paper_profile() noexcept {
-  constexpr std::array<double, kPrecisionLevels> kMap_s{1.26, 0.188, 0.031, 0.0114, 0.0081, 0.0058};    // per 10,000 m3
-  constexpr std::array<double, kPrecisionLevels> kExport_s{0.074, 0.026, 0.013, 0.005, 0.005, 0.005};   // per 10,000 m3
+  constexpr std::array<double, kPrecisionLevels> kMap_s{1.26,   0.188,  0.031,
+                                                        0.0114, 0.0081, 0.0058};  // per 10,000 m3
+  constexpr std::array<double, kPrecisionLevels> kExport_s{0.074, 0.026, 0.013,
+                                                           0.005, 0.005, 0.005};  // per 10,000 m3
   constexpr double kPlannerFinest_s = 0.37;
   constexpr double kPlannerPerOctave = 0.42275;  // (0.005 / 0.37)^(1/5)
   constexpr std::array<double, kPrecisionLevels> kHandOver_s{0.25, 0.12, 0.05, 0.03, 0.02, 0.01};
   constexpr double kPerVolume = 1e-4;
 
   CostProfile profile;
-  const auto at = [&profile](StageId id) -> StageCost& { return profile.stage[static_cast<std::size_t>(id)]; };
+  const auto at = [&profile](StageId id) -> StageCost& {
+    return profile.stage[static_cast<std::size_t>(id)];
+  };
   at(StageId::kPointCloud).fixed_s.fill(0.21 + 0.07 + 0.09);
   at(StageId::kGovernor).fixed_s.fill(0.10);
   at(StageId::kSmoother).fixed_s.fill(0.01);

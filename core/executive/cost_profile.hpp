@@ -25,10 +25,11 @@ struct CostProfile {
   [[nodiscard]] Nanos cost(StageId id, const Work& work) const noexcept;
 };
 
-/// The authors' machine (four i9 cores, ROS). Map integration and export are their measured costs per volume; the
-/// planner's is their shipped fit at 0.3 and 9.6 m with a constant factor per octave between; point cloud 0.21 s, depth
-/// conversion 0.07 s and diagnostics 0.09 s are fixed, the governor takes the measured 0.10 s (printed: 0.05), and each of
-/// the two hand-overs between machines 0.25 s at 0.3 m down to 0.01 s: one is charged to the map, one to the export.
+/// The authors' machine (four i9 cores, ROS). Map integration and export are their measured costs per volume;
+/// the planner's is their shipped fit at 0.3 and 9.6 m with a constant factor per octave between; point cloud
+/// 0.21 s, depth conversion 0.07 s and diagnostics 0.09 s are fixed, the governor takes the measured 0.10 s
+/// (printed: 0.05), and each of the two hand-overs between machines 0.25 s at 0.3 m down to 0.01 s: one is
+/// charged to the map, one to the export.
 [[nodiscard]] CostProfile paper_profile() noexcept;
 
 /// Grants a stage a fixed amount of virtual time.
@@ -36,7 +37,9 @@ class VirtualBudget final : public StageBudget {
  public:
   VirtualBudget(const CostProfile& profile, StageId id, Nanos granted) noexcept
       : profile_(profile), id_(id), granted_(granted) {}
-  [[nodiscard]] bool spent(const Work& done) noexcept override { return profile_.cost(id_, done) >= granted_; }
+  [[nodiscard]] bool spent(const Work& done) noexcept override {
+    return profile_.cost(id_, done) >= granted_;
+  }
 
  private:
   const CostProfile& profile_;

@@ -1,4 +1,5 @@
-/// How an anytime stage asks whether it must stop: it reports the work done so far, somebody else knows the time.
+/// How an anytime stage asks whether it must stop: it reports the work done so far, somebody else knows the
+/// time.
 #pragma once
 
 #include <cstddef>
@@ -12,20 +13,26 @@ inline constexpr std::size_t kStageCount = 6;
 
 [[nodiscard]] constexpr const char* to_string(StageId id) noexcept {
   switch (id) {
-    case StageId::kPointCloud: return "point_cloud";
-    case StageId::kGovernor: return "governor";
-    case StageId::kMap: return "map";
-    case StageId::kExport: return "export";
-    case StageId::kPlanner: return "planner";
-    case StageId::kSmoother: return "smoother";
+    case StageId::kPointCloud:
+      return "point_cloud";
+    case StageId::kGovernor:
+      return "governor";
+    case StageId::kMap:
+      return "map";
+    case StageId::kExport:
+      return "export";
+    case StageId::kPlanner:
+      return "planner";
+    case StageId::kSmoother:
+      return "smoother";
   }
   return "unknown";
 }
 
 /// What a stage has done so far in this step.
 struct Work {
-  /// Counted by the stage itself, and what a unit is belongs to its docstring: pixels (point cloud), map cells and
-  /// nodes visited (map, export), map lookups (planner, smoother).
+  /// Counted by the stage itself, and what a unit is belongs to its docstring: pixels (point cloud), map
+  /// cells and nodes visited (map, export), map lookups (planner, smoother).
   std::uint64_t units{0};
   double volume_m3{0.0};  ///< Space processed: integrated (map), exported (export), explored (planner).
   int level{0};           ///< Precision level at which it was processed.
@@ -33,7 +40,8 @@ struct Work {
 
 /// Contract:
 ///  1. spent() neither blocks nor allocates, and once true stays true for the rest of the step.
-///  2. A stage polls at least every 1,024 units of work, and returns its best so far as soon as it reads true.
+///  2. A stage polls at least every 1,024 units of work, and returns its best so far as soon as it reads
+///  true.
 /// Flight reads a clock here; simulation asks the cost profile what the work would have cost on the board.
 class StageBudget {
  public:

@@ -41,7 +41,8 @@ double cos_kernel(double x) noexcept {
   return 1.0 + z * sum;
 }
 
-// Arc tangent on [0, 1]: the argument is halved twice by atan(x) = 2 atan(x / (1 + sqrt(1 + x^2))), then the series.
+// Arc tangent on [0, 1]: the argument is halved twice by atan(x) = 2 atan(x / (1 + sqrt(1 + x^2))), then the
+// series.
 double atan_kernel(double x) noexcept {
   for (int i = 0; i < 2; ++i) x = x / (1.0 + std::sqrt(1.0 + x * x));
   const double z = x * x;
@@ -66,10 +67,14 @@ SinCos sin_cos(double angle_rad) noexcept {
   const double s = sin_kernel(x);
   const double c = cos_kernel(x);
   switch (static_cast<std::int64_t>(turns) & 3) {
-    case 0: return {s, c};
-    case 1: return {c, -s};
-    case 2: return {-s, -c};
-    default: return {-c, s};
+    case 0:
+      return {s, c};
+    case 1:
+      return {c, -s};
+    case 2:
+      return {-s, -c};
+    default:
+      return {-c, s};
   }
 }
 

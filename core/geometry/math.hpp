@@ -1,8 +1,8 @@
 /// Elementary functions that give the same bits on every machine.
 ///
-/// libm's results differ in the last bit between CPUs and versions; these use only + - * / sqrt and integer operations
-/// in a fixed order, and the build forbids fused multiply-adds. Error bounds are against libm, checked by
-/// tests/core/math_test.cpp. NaN in, NaN out, everywhere. RT-safe: O(1), no allocation.
+/// libm's results differ in the last bit between CPUs and versions; these use only + - * / sqrt and integer
+/// operations in a fixed order, and the build forbids fused multiply-adds. Error bounds are against libm,
+/// checked by tests/core/math_test.cpp. NaN in, NaN out, everywhere. RT-safe: O(1), no allocation.
 #pragma once
 
 namespace roborun::core {

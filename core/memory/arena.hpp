@@ -11,13 +11,14 @@
 namespace roborun::core {
 
 /// A bump allocator over a block that somebody else owns.
-/// take() is for start-up only; the spans live as long as the block. Not thread-safe. O(count) for construction.
+/// take() is for start-up only; the spans live as long as the block. Not thread-safe. O(count) for
+/// construction.
 class Arena {
  public:
   explicit Arena(std::span<std::byte> block) noexcept : block_(block) {}
 
-  /// `count` value-initialised elements, or an empty span when the block is too small (nothing is taken then, and
-  /// exhausted() is true from then on, so that a caller may check once after all its takes).
+  /// `count` value-initialised elements, or an empty span when the block is too small (nothing is taken then,
+  /// and exhausted() is true from then on, so that a caller may check once after all its takes).
   template <typename T>
   [[nodiscard]] std::span<T> take(std::size_t count) noexcept {
     static_assert(std::is_trivially_destructible_v<T>, "an arena never runs destructors");

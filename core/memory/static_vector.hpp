@@ -6,8 +6,8 @@
 
 namespace roborun::core {
 
-/// Up to N elements, contiguous, never on the heap. push_back on a full one changes nothing and returns false.
-/// Indexing past size() is a bug of the caller. RT-safe: every call O(1).
+/// Up to N elements, contiguous, never on the heap. push_back on a full one changes nothing and returns
+/// false. Indexing past size() is a bug of the caller. RT-safe: every call O(1).
 template <typename T, std::size_t N>
 class StaticVector {
  public:

@@ -1,5 +1,5 @@
-/// Random numbers as a pure function of (seed, stream, counter): the same on every machine, and any draw can be had
-/// without the ones before it.
+/// Random numbers as a pure function of (seed, stream, counter): the same on every machine, and any draw can
+/// be had without the ones before it.
 #pragma once
 
 #include <cmath>
@@ -16,7 +16,8 @@ namespace roborun::core {
   return x ^ (x >> 31U);
 }
 
-/// SplitMix64 with a key of its own for each (seed, stream). Copying copies the position. RT-safe: O(1) a draw.
+/// SplitMix64 with a key of its own for each (seed, stream). Copying copies the position. RT-safe: O(1) a
+/// draw.
 class CounterRng {
  public:
   explicit CounterRng(std::uint64_t seed, std::uint64_t stream = 0) noexcept

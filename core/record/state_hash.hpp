@@ -11,7 +11,8 @@
 
 namespace roborun::core {
 
-/// Order matters. Every NaN counts as the same, and -0 as 0, because machines differ there. RT-safe: O(1) an item.
+/// Order matters. Every NaN counts as the same, and -0 as 0, because machines differ there. RT-safe: O(1) an
+/// item.
 class StateHash {
  public:
   void add(std::uint64_t value) noexcept { state_ = mix64(state_ ^ value) + 0x9E3779B97F4A7C15ULL; }

@@ -1,9 +1,10 @@
 #include "governor/models/latency_model.hpp"
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+
+#include "core/geometry/inverse.hpp"
 
 namespace roborun::governor {
 
@@ -29,7 +30,8 @@ Eq4Fit fit_eq4(std::span<const LatencyPoint> points) noexcept {
   using Vector4 = Eigen::Vector4d;
   const auto row_of = [](const LatencyPoint& point) {
     const double r = 1.0 / cell_size_m(point.level);
-    return Vector4(r * r * r * point.volume_m3, r * r * point.volume_m3, r * point.volume_m3, 1.0) / point.latency_s;
+    return Vector4(r * r * r * point.volume_m3, r * r * point.volume_m3, r * point.volume_m3, 1.0) /
+           point.latency_s;
   };
   Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
   Vector4 right = Vector4::Zero();
@@ -56,7 +58,7 @@ Eq4Fit fit_eq4(std::span<const LatencyPoint> points) noexcept {
         if (((set >> static_cast<unsigned>(k)) & 1U) != 0) A(i, k) = normal(i, k) * unit[i] * unit[k];
       }
     }
-    const Vector4 scaled = Eigen::PartialPivLU<Eigen::Matrix4d>(A).solve(b);
+    const Vector4 scaled = core::inverse<4>(A) * b;
     const Vector4 x = scaled.cwiseProduct(unit);
     if (!x.allFinite() || x.minCoeff() < 0.0) continue;
     const double cost = count - 2.0 * right.dot(x) + x.dot(normal * x);

@@ -9,8 +9,8 @@
 
 namespace roborun::governor {
 
-/// latency(level, v) = fixed_s[level] + slope_s_per_m3[level] v. Linear in the volume at each precision, as Eq. 4 is;
-/// Eq. 4 itself is one way to fill the slopes. Non-negative everywhere.
+/// latency(level, v) = fixed_s[level] + slope_s_per_m3[level] v. Linear in the volume at each precision, as
+/// Eq. 4 is; Eq. 4 itself is one way to fill the slopes. Non-negative everywhere.
 struct LatencyModel {
   std::array<double, kPrecisionLevels> fixed_s{};
   std::array<double, kPrecisionLevels> slope_s_per_m3{};
@@ -38,12 +38,13 @@ struct Eq4Fit {
   double mean_relative_error{};
   double max_relative_error{};
 };
-/// Least squares of the relative error with all coefficients >= 0 (so that the model is monotone), q3 = 1, by trying the
-/// 16 sets of active coefficients. Points with latency <= 0 are left out. Start-up only: O(16 * points).
+/// Least squares of the relative error with all coefficients >= 0 (so that the model is monotone), q3 = 1, by
+/// trying the 16 sets of active coefficients. Points with latency <= 0 are left out. Start-up only: O(16 *
+/// points).
 [[nodiscard]] Eq4Fit fit_eq4(std::span<const LatencyPoint> points) noexcept;
 
-/// Follows a machine that became slower than its model: predicted times are multiplied by it. Rises at once to what was
-/// seen, falls by 2 % a decision; always within [1, 4].
+/// Follows a machine that became slower than its model: predicted times are multiplied by it. Rises at once
+/// to what was seen, falls by 2 % a decision; always within [1, 4].
 class DriftScale {
  public:
   void observe(double predicted_s, double spent_s) noexcept;

@@ -13,11 +13,12 @@ struct StoppingModel {
   [[nodiscard]] double distance_m(double speed_mps) const noexcept;
 };
 
-/// The authors' simulated drone, fitted on (v m/s, m): (0.995, 0.266) (1.975, 0.598) (3.921, 2.162) (5.834, 3.539)
-/// (7.712, 5.985) (9.563, 8.151). Relative mean squared error 1.65 %.
+/// The authors' simulated drone, fitted on (v m/s, m): (0.995, 0.266) (1.975, 0.598) (3.921, 2.162)
+/// (5.834, 3.539) (7.712, 5.985) (9.563, 8.151). Relative mean squared error 1.65 %.
 inline constexpr StoppingModel kRoborunStopping{0.05494, 0.3549, -0.2038};
 
-/// The quadrotor of platform/sitl braking along a smoothed trajectory. See tests/platform/sitl/vehicle/stopping_test.cpp.
+/// The quadrotor of platform/sitl braking along a smoothed trajectory. See
+/// tests/platform/sitl/vehicle/stopping_test.cpp.
 inline constexpr StoppingModel kSitlQuadrotorStopping{0.155, 0.45, 0.05};
 
 }  // namespace roborun::governor

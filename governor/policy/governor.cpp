@@ -20,33 +20,47 @@ constexpr std::size_t index(core::StageId id) noexcept { return static_cast<std:
 
 const char* to_string(Design design) noexcept {
   switch (design) {
-    case Design::kAware: return "aware";
-    case Design::kStatic: return "static";
-    case Design::kStaticFair: return "static-fair";
+    case Design::kAware:
+      return "aware";
+    case Design::kStatic:
+      return "static";
+    case Design::kStaticFair:
+      return "static-fair";
   }
   return "unknown";
 }
 
 const char* to_string(BudgetSource source) noexcept {
   switch (source) {
-    case BudgetSource::kTrajectory: return "trajectory";
-    case BudgetSource::kVisibility: return "visibility";
-    case BudgetSource::kShortest: return "shortest";
-    case BudgetSource::kLongest: return "longest";
-    case BudgetSource::kFailures: return "failures";
-    case BudgetSource::kFixed: return "fixed";
+    case BudgetSource::kTrajectory:
+      return "trajectory";
+    case BudgetSource::kVisibility:
+      return "visibility";
+    case BudgetSource::kShortest:
+      return "shortest";
+    case BudgetSource::kLongest:
+      return "longest";
+    case BudgetSource::kFailures:
+      return "failures";
+    case BudgetSource::kFixed:
+      return "fixed";
   }
   return "unknown";
 }
 
 Governor::Governor(const GovernorConfig& config) noexcept : config_(config) {
   switch (config.design) {
-    case Design::kAware: v_max_mps_ = config.v_max_mps; break;
-    case Design::kStatic: v_max_mps_ = kStaticSpeed_mps; break;
+    case Design::kAware:
+      v_max_mps_ = config.v_max_mps;
+      break;
+    case Design::kStatic:
+      v_max_mps_ = kStaticSpeed_mps;
+      break;
     case Design::kStaticFair: {
       const double reach_m3 = config.sensor_volume_max_m3;
-      const double latency_s = config.point_cloud_s + config.smoother_s + predicted_s(0, 0, std::min(kStaticV0_m3, reach_m3)) +
-                               predicted_s(1, 0, kStaticV1_m3) + predicted_s(2, 0, std::min(kStaticV2_m3, reach_m3));
+      const double latency_s =
+          config.point_cloud_s + config.smoother_s + predicted_s(0, 0, std::min(kStaticV0_m3, reach_m3)) +
+          predicted_s(1, 0, kStaticV1_m3) + predicted_s(2, 0, std::min(kStaticV2_m3, reach_m3));
       v_max_mps_ = std::min(config.v_max_mps, safe_speed_mps(config.design_visibility_m, latency_s));
       break;
     }
@@ -60,10 +74,17 @@ double Governor::predicted_s(int stage, int level, double volume_m3) const noexc
 
 void Governor::observe(core::StageId id, double predicted_s, double spent_s) noexcept {
   switch (id) {
-    case core::StageId::kMap: scale_[0].observe(predicted_s / scale_[0].value(), spent_s); break;
-    case core::StageId::kExport: scale_[1].observe(predicted_s / scale_[1].value(), spent_s); break;
-    case core::StageId::kPlanner: scale_[2].observe(predicted_s / scale_[2].value(), spent_s); break;
-    default: break;
+    case core::StageId::kMap:
+      scale_[0].observe(predicted_s / scale_[0].value(), spent_s);
+      break;
+    case core::StageId::kExport:
+      scale_[1].observe(predicted_s / scale_[1].value(), spent_s);
+      break;
+    case core::StageId::kPlanner:
+      scale_[2].observe(predicted_s / scale_[2].value(), spent_s);
+      break;
+    default:
+      break;
   }
 }
 
@@ -101,7 +122,13 @@ Decision Governor::decide_static(const SpaceProfile& profile) const noexcept {
   fill_prediction(d);
   double total_s = 0.0;
   for (const double s : d.predicted_s) total_s += s;
-  d.point = {0, 0, kStaticV0_m3, kStaticV1_m3, kStaticV2_m3, whole_frames(total_s * (1.0 + config_.policy.reserve_ratio) + seconds(config_.minor_frame)), v_max_mps_};
+  d.point = {0,
+             0,
+             kStaticV0_m3,
+             kStaticV1_m3,
+             kStaticV2_m3,
+             whole_frames(total_s * (1.0 + config_.policy.reserve_ratio) + seconds(config_.minor_frame)),
+             v_max_mps_};
   d.solution.latency_s = total_s;
   d.time_budget = d.point.deadline;
   return d;
@@ -112,8 +139,8 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   const Policy& policy = config_.policy;
   Decision d;
 
-  // 1. How precisely must we look? An obstacle grows by up to a cell, and so does the vehicle's box, on either side of a
-  // gap: of width g it is passable for certain on cells of (g - width) / 4.
+  // 1. How precisely must we look? An obstacle grows by up to a cell, and so does the vehicle's box, on
+  // either side of a gap: of width g it is passable for certain on cells of (g - width) / 4.
   const double gap_cell_m = 0.25 * (profile.gap_average_m - config_.vehicle_width_m);
   d.demand_m = std::fmin(gap_cell_m, profile.closest_obstacle_m / policy.cells_to_obstacle);
   int coarsest = std::min(coarsest_level_within(d.demand_m), config_.coarsest_level);
@@ -126,14 +153,17 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   const double see_m3 = profile.sensor_volume_m3;
   const auto needed_s = [&](int level, double share) {
     return (overhead_s + predicted_s(0, level, share * see_m3) + predicted_s(1, level, share * see_m3) +
-            predicted_s(2, level, share * policy.planner_share * see_m3)) * (1.0 + policy.reserve_ratio);
+            predicted_s(2, level, share * policy.planner_share * see_m3)) *
+           (1.0 + policy.reserve_ratio);
   };
 
   // 2. How long may we think? As long as is safe, but no longer than is useful.
   const BudgetLimits limits{policy.shortest, policy.longest_budget};
   const bool has_outlook = profile.outlook_count > 0;
-  d.time_budget = has_outlook ? trajectory_budget({profile.outlook.data(), profile.outlook_count}, config_.stopping, limits)
-                              : time_budget(profile.closest_unknown_m, profile.speed_mps, config_.stopping, limits);
+  d.time_budget =
+      has_outlook
+          ? trajectory_budget({profile.outlook.data(), profile.outlook_count}, config_.stopping, limits)
+          : time_budget(profile.closest_unknown_m, profile.speed_mps, config_.stopping, limits);
   d.source = has_outlook ? BudgetSource::kTrajectory : BudgetSource::kVisibility;
   double deadline_s = seconds(d.time_budget) / policy.decisions_per_budget;
   const double useful_s = std::max(seconds(policy.longest), needed_s(coarsest, 1.0));
@@ -146,7 +176,8 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
     d.source = BudgetSource::kShortest;
   }
 
-  // Time wins over precision: the deadline belongs to physics. Coarser until enough of the space can be seen in time.
+  // Time wins over precision: the deadline belongs to physics. Coarser until enough of the space can be seen
+  // in time.
   while (coarsest < config_.coarsest_level && needed_s(coarsest, policy.least_share) > deadline_s) ++coarsest;
 
   // 3. The operating point.
@@ -175,14 +206,17 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
     d.solution.v1_m3 = d.solution.v0_m3;
     d.solution.v2_m3 = policy.planner_share * d.solution.v0_m3;
     fill_prediction(d);
-    deadline_s = std::max(deadline_s, needed_s(d.solution.p1_level, policy.least_share) + seconds(config_.minor_frame));
+    deadline_s = std::max(deadline_s,
+                          needed_s(d.solution.p1_level, policy.least_share) + seconds(config_.minor_frame));
   }
 
   // 4. How fast may the next trajectory be?
-  double speed_mps = std::clamp(safe_speed_mps(profile.closest_unknown_m, needed_s(coarsest, 1.0)), policy.slowest_mps, v_max_mps_);
+  double speed_mps = std::clamp(safe_speed_mps(profile.closest_unknown_m, needed_s(coarsest, 1.0)),
+                                policy.slowest_mps, v_max_mps_);
   if (near_goal) speed_mps = std::min(speed_mps, policy.near_goal_speed_mps);
 
-  d.point = {d.solution.p0_level, d.solution.p1_level, d.solution.v0_m3, d.solution.v1_m3, d.solution.v2_m3, whole_frames(deadline_s), speed_mps};
+  d.point = {d.solution.p0_level, d.solution.p1_level,      d.solution.v0_m3, d.solution.v1_m3,
+             d.solution.v2_m3,    whole_frames(deadline_s), speed_mps};
   return d;
 }
 

@@ -1,5 +1,5 @@
-/// Turns what the stages observed into what they may spend: time budget, operating point, speed limit, one decision at a
-/// time. Source: RoboRun section "Governor".
+/// Turns what the stages observed into what they may spend: time budget, operating point, speed limit, one
+/// decision at a time. Source: RoboRun section "Governor".
 #pragma once
 
 #include <array>
@@ -28,22 +28,23 @@ enum class BudgetSource : std::uint8_t { kTrajectory, kVisibility, kShortest, kL
 
 /// The extra rules beyond Eq. 3, one row each.
 struct Policy {
-  /// A frame taken at t0 gives a trajectory that takes over at t0 + T and must last until its successor does, at t0 + 2 T:
-  /// hence T = budget / 2. (The authors' code has the factor, without the reason.)
+  /// A frame taken at t0 gives a trajectory that takes over at t0 + T and must last until its successor does,
+  /// at t0 + 2 T: hence T = budget / 2. (The authors' code has the factor, without the reason.)
   double decisions_per_budget{2.0};
-  Nanos shortest{200'000'000};            ///< No decision shorter than this.
-  /// More thinking than this makes flight slower, not better, unless the precision that the space asks for takes longer.
+  Nanos shortest{200'000'000};  ///< No decision shorter than this.
+  /// More thinking than this makes flight slower, not better, unless the precision that the space asks for
+  /// takes longer.
   Nanos longest{800'000'000};
-  Nanos longest_budget{15'000'000'000};   ///< The authors' cap: what a standing vehicle is given.
-  int failures_until_finer{2};            ///< From this many failed decisions on, one level finer for each.
-  int coarser_levels_per_decision{1};     ///< Precision is lost slowly and won at once.
-  double cells_to_obstacle{2.0};          ///< At least so many cells between the vehicle and the nearest obstacle.
-  double planner_share{0.4};              ///< Of the perceived space, what a plan through it explores at most.
-  double least_share{0.5};                ///< Of the space in view: seeing less is not worth a decision.
-  double near_goal_m{8.0};                ///< Nearer than this: at most 0.6 m cells ...
-  double near_goal_speed_mps{2.5};        ///< ... and this speed.
-  double reserve_ratio{0.06};             ///< Share of the deadline that is not planned for.
-  double slowest_mps{0.5};                ///< No speed limit below this: each trajectory ends in a stop anyway.
+  Nanos longest_budget{15'000'000'000};  ///< The authors' cap: what a standing vehicle is given.
+  int failures_until_finer{2};           ///< From this many failed decisions on, one level finer for each.
+  int coarser_levels_per_decision{1};    ///< Precision is lost slowly and won at once.
+  double cells_to_obstacle{2.0};    ///< At least so many cells between the vehicle and the nearest obstacle.
+  double planner_share{0.4};        ///< Of the perceived space, what a plan through it explores at most.
+  double least_share{0.5};          ///< Of the space in view: seeing less is not worth a decision.
+  double near_goal_m{8.0};          ///< Nearer than this: at most 0.6 m cells ...
+  double near_goal_speed_mps{2.5};  ///< ... and this speed.
+  double reserve_ratio{0.06};       ///< Share of the deadline that is not planned for.
+  double slowest_mps{0.5};          ///< No speed limit below this: each trajectory ends in a stop anyway.
 };
 
 struct GovernorConfig {
@@ -54,28 +55,29 @@ struct GovernorConfig {
   double point_cloud_s{};               ///< Fixed costs of the other stages.
   double governor_s{};                  ///< 0 for the static designs: they have none.
   double smoother_s{};
-  double v_max_mps{6.0};                ///< RoboRun Table "Knob values"; the static design's is 0.5.
+  double v_max_mps{6.0};  ///< RoboRun Table "Knob values"; the static design's is 0.5.
   double vehicle_width_m{1.2};
-  double sensor_volume_max_m3{60e3};    ///< The most that the cameras can see between the height limits.
-  int coarsest_level{3};                ///< Cells must fit several times into the flight band.
-  double design_visibility_m{10.0};     ///< static-fair: the worst visibility of the congested zones (authors: 8 to 10 m).
+  double sensor_volume_max_m3{60e3};  ///< The most that the cameras can see between the height limits.
+  int coarsest_level{3};              ///< Cells must fit several times into the flight band.
+  double design_visibility_m{
+      10.0};  ///< static-fair: the worst visibility of the congested zones (authors: 8 to 10 m).
   Nanos minor_frame{2'500'000};
 };
 
 struct Situation {
-  int failures{};            ///< Decisions in a row without a new trajectory.
+  int failures{};  ///< Decisions in a row without a new trajectory.
   double distance_to_goal_m{};
 };
 
 /// What was decided, and why.
 struct Decision {
   OperatingPoint point{};
-  Nanos time_budget{};                      ///< Before the policy.
+  Nanos time_budget{};  ///< Before the policy.
   BudgetSource source{};
   SolverProblem problem{};
   SolverSolution solution{};
   std::array<double, core::kStageCount> predicted_s{};
-  double demand_m{};                        ///< Coarsest cell that the space allows: min((g_avg - width) / 4, d_obs / 2).
+  double demand_m{};  ///< Coarsest cell that the space allows: min((g_avg - width) / 4, d_obs / 2).
 };
 
 /// One instance a vehicle. RT-safe: O(1), no allocation.

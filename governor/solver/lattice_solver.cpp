@@ -34,7 +34,8 @@ Bounds bounds_of(const SolverProblem& p) noexcept {
     b.empty = true;
     b.finest = b.coarsest;
   }
-  b.v1_max_m3 = std::min({at_least_zero(p.v_sensor_m3), at_least_zero(p.v_map_m3), at_least_zero(p.v1_max_m3)});
+  b.v1_max_m3 =
+      std::min({at_least_zero(p.v_sensor_m3), at_least_zero(p.v_map_m3), at_least_zero(p.v1_max_m3)});
   b.v0_max_m3 = std::min(at_least_zero(p.v0_max_m3), b.v1_max_m3);
   b.v2_max_m3 = at_least_zero(p.v2_max_m3);
   return b;
@@ -59,7 +60,8 @@ double latency_of(const SolverProblem& p, const SolverSolution& s) noexcept {
          p.model[2].latency_s(s.p1_level, s.v2_m3);
 }
 
-SolverSolution solve_pair(const SolverProblem& p, const Bounds& b, double delta_d_s, int p0, int p1) noexcept {
+SolverSolution solve_pair(const SolverProblem& p, const Bounds& b, double delta_d_s, int p0,
+                          int p1) noexcept {
   SolverSolution s;
   s.p0_level = p0;
   s.p1_level = p1;
@@ -119,14 +121,17 @@ SolverSolution solve(const SolverProblem& problem) noexcept {
 bool is_feasible(const SolverProblem& p, const SolverSolution& s) noexcept {
   if (s.status != Status::kOk) return false;
   const Bounds b = bounds_of(p);
-  const bool precision_ok = s.p0_level >= b.finest && s.p0_level <= b.coarsest && s.p1_level >= s.p0_level && s.p1_level <= b.p1_coarsest;
+  const bool precision_ok = s.p0_level >= b.finest && s.p0_level <= b.coarsest && s.p1_level >= s.p0_level &&
+                            s.p1_level <= b.p1_coarsest;
   const double slack = 1e-9;
-  const bool volume_ok = s.v0_m3 >= 0.0 && s.v0_m3 <= b.v0_max_m3 * (1.0 + slack) && s.v1_m3 >= s.v0_m3 * (1.0 - slack) &&
-                         s.v1_m3 <= b.v1_max_m3 * (1.0 + slack) && s.v2_m3 >= 0.0 && s.v2_m3 <= b.v2_max_m3 * (1.0 + slack);
+  const bool volume_ok = s.v0_m3 >= 0.0 && s.v0_m3 <= b.v0_max_m3 * (1.0 + slack) &&
+                         s.v1_m3 >= s.v0_m3 * (1.0 - slack) && s.v1_m3 <= b.v1_max_m3 * (1.0 + slack) &&
+                         s.v2_m3 >= 0.0 && s.v2_m3 <= b.v2_max_m3 * (1.0 + slack);
   if (!precision_ok || !volume_ok) return false;
   const double latency_s = latency_of(p, s);
   const double gap_s = p.delta_d_s - latency_s;
-  return latency_s <= p.delta_d_s * (1.0 + slack) + slack && std::fabs(latency_s - s.latency_s) <= slack * (1.0 + latency_s) &&
+  return latency_s <= p.delta_d_s * (1.0 + slack) + slack &&
+         std::fabs(latency_s - s.latency_s) <= slack * (1.0 + latency_s) &&
          std::fabs(gap_s * gap_s - s.objective_s2) <= slack * (1.0 + gap_s * gap_s);
 }
 

@@ -21,7 +21,8 @@ stages::BrickMap::Config brick_config(const Aabb& map_bounds_W, const sitl::Dept
   return config;
 }
 
-std::unique_ptr<stages::OccupancyMap> make_map(const std::string& name, const Aabb& bounds_W, const sitl::DepthCameraConfig& camera, core::Arena& arena) {
+std::unique_ptr<stages::OccupancyMap> make_map(const std::string& name, const Aabb& bounds_W,
+                                               const sitl::DepthCameraConfig& camera, core::Arena& arena) {
   if (name == "own") return std::make_unique<stages::BrickMap>(brick_config(bounds_W, camera), arena);
   if (name == "octomap") return stages::make_octomap_backend({bounds_W, camera.range_m + 5.0});
   throw sitl::InputError(fmt::format("unknown map '{}': must be own or octomap", name));
@@ -32,7 +33,10 @@ std::unique_ptr<stages::Planner> make_planner(const std::string& name, core::Are
   std::unique_ptr<stages::Planner> planner;
   if (name.rfind("ompl:", 0) == 0) planner = stages::make_ompl_planner(name.substr(5), {});
   if (planner == nullptr) {
-    throw sitl::InputError(fmt::format("unknown planner '{}': must be own, ompl:RRTstar, ompl:InformedRRTstar, ompl:RRTConnect or ompl:BITstar", name));
+    throw sitl::InputError(
+        fmt::format("unknown planner '{}': must be own, ompl:RRTstar, ompl:InformedRRTstar, ompl:RRTConnect "
+                    "or ompl:BITstar",
+                    name));
   }
   return planner;
 }
@@ -40,7 +44,8 @@ std::unique_ptr<stages::Planner> make_planner(const std::string& name, core::Are
 }  // namespace
 
 std::size_t backend_bytes(const Aabb& map_bounds_W, const sitl::DepthCameraConfig& camera) {
-  return stages::BrickMap::arena_bytes(brick_config(map_bounds_W, camera)) + stages::RrtStar::arena_bytes({}) + 4096;
+  return stages::BrickMap::arena_bytes(brick_config(map_bounds_W, camera)) +
+         stages::RrtStar::arena_bytes({}) + 4096;
 }
 
 MapAndPlanner make_backends(const std::string& map, const std::string& planner, const Aabb& map_bounds_W,

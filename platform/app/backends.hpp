@@ -19,9 +19,10 @@ struct MapAndPlanner {
 
 /// Bytes that the own backends take from the arena.
 [[nodiscard]] std::size_t backend_bytes(const Aabb& map_bounds_W, const sitl::DepthCameraConfig& camera);
-/// map: "own" or "octomap"; planner: "own" or "ompl:NAME". Throws sitl::InputError for anything else, and for a world that
-/// the map cannot hold.
-[[nodiscard]] MapAndPlanner make_backends(const std::string& map, const std::string& planner, const Aabb& map_bounds_W,
-                                          const sitl::DepthCameraConfig& camera, core::Arena& arena);
+/// map: "own" or "octomap"; planner: "own" or "ompl:NAME". Throws sitl::InputError for anything else, and for
+/// a world that the map cannot hold.
+[[nodiscard]] MapAndPlanner make_backends(const std::string& map, const std::string& planner,
+                                          const Aabb& map_bounds_W, const sitl::DepthCameraConfig& camera,
+                                          core::Arena& arena);
 
 }  // namespace roborun::app

@@ -15,10 +15,17 @@ constexpr double kCornerRoom_m = 0.25;
 
 }  // namespace
 
-DecisionPipeline::DecisionPipeline(const PipelineConfig& config, const core::CostProfile& costs, governor::Governor& governor,
-                                   stages::PointCloud& cloud, stages::OccupancyMap& map, stages::Planner& planner,
+DecisionPipeline::DecisionPipeline(const PipelineConfig& config, const core::CostProfile& costs,
+                                   governor::Governor& governor, stages::PointCloud& cloud,
+                                   stages::OccupancyMap& map, stages::Planner& planner,
                                    stages::Smoother& smoother) noexcept
-    : config_(config), costs_(costs), governor_(governor), cloud_(cloud), map_(map), planner_(planner), smoother_(smoother) {
+    : config_(config),
+      costs_(costs),
+      governor_(governor),
+      cloud_(cloud),
+      map_(map),
+      planner_(planner),
+      smoother_(smoother) {
   cloud_.set_height_limits(config.map_bounds_W.min_W.z(), config.map_bounds_W.max_W.z());
 }
 
@@ -31,7 +38,8 @@ void DecisionPipeline::charge(core::StageId id, const core::Work& work, Decision
 
 core::VirtualBudget DecisionPipeline::budget_of(core::StageId id, const DecisionOutput& out) const noexcept {
   Nanos rest = out.decision.point.deadline - out.latency;
-  for (std::size_t later = index(id) + 1; later < core::kStageCount; ++later) rest -= from_seconds(out.decision.predicted_s[later]);
+  for (std::size_t later = index(id) + 1; later < core::kStageCount; ++later)
+    rest -= from_seconds(out.decision.predicted_s[later]);
   return {costs_, id, rest};
 }
 
@@ -40,26 +48,31 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   core::Work work;
   (void)cloud_.step(in.frames, 0, unlimited, work);
   const double r_m = radius_m();
-  const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m), config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
-  profile_space({}, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W, relevant_W, r_m, out.profile, work.units);
+  const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m),
+                        config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
+  profile_space({}, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W,
+                relevant_W, r_m, out.profile, work.units);
   out.profile.sensor_volume_m3 = cloud_.seen_volume_m3();
   // What the map will hold once this decision's images are in it.
   out.profile.map_volume_m3 = map_.known_volume_m3() + cloud_.seen_volume_m3();
   charge(core::StageId::kPointCloud, work, out);
 
   out.decision = governor_.decide(out.profile, {failures_, (in.goal_W - in.p_WB).norm()});
-  if (out.decision.predicted_s[index(core::StageId::kGovernor)] > 0.0) charge(core::StageId::kGovernor, {}, out);
+  if (out.decision.predicted_s[index(core::StageId::kGovernor)] > 0.0)
+    charge(core::StageId::kGovernor, {}, out);
 
   core::StaticVector<Vector3, kTrajectoryPoints> trajectory_W;
   (void)trajectory_W.push_back(in.p_WB);
   const double begin_s = seconds(in.now - in.committed->start_time);
-  for (double ahead_s = kTrajectoryStep_s; ahead_s < in.committed->duration_s() - begin_s; ahead_s += kTrajectoryStep_s) {
+  for (double ahead_s = kTrajectoryStep_s; ahead_s < in.committed->duration_s() - begin_s;
+       ahead_s += kTrajectoryStep_s) {
     if (!trajectory_W.push_back(in.committed->at_s(begin_s + ahead_s).p_W)) break;
   }
   const OperatingPoint& point = out.decision.point;
   core::VirtualBudget map_budget = budget_of(core::StageId::kMap, out);
   stages::IntegrationResult integrated;
-  (void)map_.integrate({in.frames, point.p0_level, point.v0_m3, {trajectory_W.begin(), trajectory_W.size()}}, map_budget, integrated);
+  (void)map_.integrate({in.frames, point.p0_level, point.v0_m3, {trajectory_W.begin(), trajectory_W.size()}},
+                       map_budget, integrated);
   charge(core::StageId::kMap, integrated.work, out);
 
   core::VirtualBudget export_budget = budget_of(core::StageId::kExport, out);
@@ -78,7 +91,8 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   // Is what we fly still free? If not, the stop takes over as soon as it can.
   std::uint64_t check_lookups = 0;
   const double from_s = seconds(in.now - in.committed->start_time);
-  const bool committed_free = is_trajectory_free(view, *in.committed, from_s, config_.vehicle_radius_m, check_lookups);
+  const bool committed_free =
+      is_trajectory_free(view, *in.committed, from_s, config_.vehicle_radius_m, check_lookups);
 
   // First with room for the smoother to cut corners, then as tight as the vehicle can fly.
   stages::SmoothResult smoothed;
@@ -102,6 +116,8 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
     out.planned_to_goal = planned.reaches_goal;
     planner_work.units += planned.work.units;
     planner_work.volume_m3 += planned.work.volume_m3;
+    // Too tight for extra room is no reason to flee.
+    if (room_m > 0.0 && out.planner_status == Status::kStartBlocked) continue;
     if (planned.path_W.size() >= 2) {
       stages::SmoothRequest smooth;
       smooth.path_W = {planned.path_W.begin(), planned.path_W.size()};
@@ -124,7 +140,8 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
     const MonotonicTime soonest = in.now + out.latency + Nanos{2'500'000};
     const TrajectoryPoint then = in.committed->at(soonest);
     if (then.v_W.norm() > 0.05 &&
-        smoother_.brake(then, soonest, {config_.acceleration_mps2, config_.acceleration_mps2}, out.trajectory) == Status::kOk) {
+        smoother_.brake(then, soonest, {config_.acceleration_mps2, config_.acceleration_mps2},
+                        out.trajectory) == Status::kOk) {
       out.kind = DecisionKind::kBrake;
     }
   }

@@ -25,7 +25,7 @@ struct PipelineConfig {
   double inflation_m{0.3};
   double horizon_m{24.0};  ///< No way-point farther than this: one metre less than the cameras see.
   double acceleration_mps2{4.0};
-  Aabb map_bounds_W{};           ///< What the map stores; its heights limit what counts as seen volume.
+  Aabb map_bounds_W{};  ///< What the map stores; its heights limit what counts as seen volume.
 };
 
 struct DecisionInput {

@@ -18,7 +18,8 @@ void FlightLane::read(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_i
   firmware_if::GnssFix fix;
   for (int i = 0; i < kMost && gnss.read(fix) == Status::kOk; ++i) (void)estimator_.update(fix);
   firmware_if::BarometerSample pressure;
-  for (int i = 0; i < kMost && barometer.read(pressure) == Status::kOk; ++i) (void)estimator_.update(pressure);
+  for (int i = 0; i < kMost && barometer.read(pressure) == Status::kOk; ++i)
+    (void)estimator_.update(pressure);
 }
 
 void FlightLane::fly(MonotonicTime now, firmware_if::Motors& motors) {
@@ -34,7 +35,8 @@ void FlightLane::fly(MonotonicTime now, firmware_if::Motors& motors) {
     committed_ = take_off_(in.state.p_WB, now);
     taking_off_ = true;
   }
-  if (!airborne_ && now > committed_.start_time + from_seconds(committed_.duration_s()) + kHover) airborne_ = true;
+  if (!airborne_ && now > committed_.start_time + from_seconds(committed_.duration_s()) + kHover)
+    airborne_ = true;
   if (offered_ && offered_->start_time <= now) {
     committed_ = *offered_;
     offered_.reset();

@@ -25,10 +25,12 @@ class FlightLane {
   void set_take_off(TakeOff take_off) { take_off_ = std::move(take_off); }
   /// A trajectory that takes over at its start time. The last one offered counts.
   void offer(const Trajectory& trajectory) { offered_ = trajectory; }
-  /// One minor frame: read all sensors, estimate, switch to an offered trajectory that is due, track, command.
+  /// One minor frame: read all sensors, estimate, switch to an offered trajectory that is due, track,
+  /// command.
   template <typename Sensors>
   void step(MonotonicTime now, Sensors& sensors, firmware_if::Motors& motors) {
-    read(static_cast<firmware_if::Imu&>(sensors), static_cast<firmware_if::Gnss&>(sensors), static_cast<firmware_if::Barometer&>(sensors));
+    read(static_cast<firmware_if::Imu&>(sensors), static_cast<firmware_if::Gnss&>(sensors),
+         static_cast<firmware_if::Barometer&>(sensors));
     fly(now, motors);
   }
 

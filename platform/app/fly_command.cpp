@@ -55,16 +55,20 @@ std::vector<std::string> split(const std::string& text) {
 }
 
 governor::Design design_of(const std::string& name) {
-  for (const auto design : {governor::Design::kAware, governor::Design::kStatic, governor::Design::kStaticFair}) {
+  for (const auto design :
+       {governor::Design::kAware, governor::Design::kStatic, governor::Design::kStaticFair}) {
     if (name == governor::to_string(design)) return design;
   }
-  throw InputError(fmt::format("--design: unknown design '{}': must be aware, static, static-fair, or several with commas between", name));
+  throw InputError(fmt::format(
+      "--design: unknown design '{}': must be aware, static, static-fair, or several with commas between",
+      name));
 }
 
 sitl::Mission mission_of(const std::string& name) {
   if (name == "package_delivery") return sitl::Mission::kPackageDelivery;
   if (name == "search_and_rescue") return sitl::Mission::kSearchAndRescue;
-  throw InputError(fmt::format("--mission: unknown mission '{}': must be package_delivery or search_and_rescue", name));
+  throw InputError(
+      fmt::format("--mission: unknown mission '{}': must be package_delivery or search_and_rescue", name));
 }
 
 std::uint64_t seed_of(const std::string& text) {
@@ -75,7 +79,9 @@ std::uint64_t seed_of(const std::string& text) {
   } catch (const std::exception&) {
     used = 0;
   }
-  if (used == 0 || used != text.size()) throw InputError(fmt::format("--seed: '{}' is not a seed: must be a whole number from 0 to 18446744073709551615", text));
+  if (used == 0 || used != text.size())
+    throw InputError(fmt::format(
+        "--seed: '{}' is not a seed: must be a whole number from 0 to 18446744073709551615", text));
   return seed;
 }
 
@@ -89,18 +95,22 @@ std::optional<Vector3> point_of(const char* option, const std::string& text) {
     p_W[static_cast<Eigen::Index>(i)] = std::strtod(parts[i].c_str(), &end);
     ok = !parts[i].empty() && *end == '\0';
   }
-  if (!ok || !is_finite(p_W)) throw InputError(fmt::format("{}: '{}' is not a point: must be X,Y,Z in metres", option, text));
+  if (!ok || !is_finite(p_W))
+    throw InputError(fmt::format("{}: '{}' is not a point: must be X,Y,Z in metres", option, text));
   return p_W;
 }
 
 Profile profile_of(const Options& options) {
   if (!(options.host_factor > 0.0 && options.host_factor <= 1000.0)) {
-    throw InputError(fmt::format("--host-factor: {} is out of range: must be above 0, at most 1000", options.host_factor));
+    throw InputError(
+        fmt::format("--host-factor: {} is out of range: must be above 0, at most 1000", options.host_factor));
   }
   if (options.profile == "paper") return paper();
-  if (options.profile != "host") throw InputError(fmt::format("--profile: unknown profile '{}': must be paper or host", options.profile));
+  if (options.profile != "host")
+    throw InputError(fmt::format("--profile: unknown profile '{}': must be paper or host", options.profile));
   std::string note;
-  const Profile profile = host(options.host_file.empty() ? default_host_path() : options.host_file, options.host_factor, note);
+  const Profile profile =
+      host(options.host_file.empty() ? default_host_path() : options.host_file, options.host_factor, note);
   if (!note.empty()) fmt::print(stderr, "roborun: {}\n", note);
   return profile;
 }
@@ -108,7 +118,8 @@ Profile profile_of(const Options& options) {
 /// A line on the terminal that is rewritten, or one line every ten seconds where there is none.
 class ProgressLine {
  public:
-  explicit ProgressLine(std::string name) : name_(std::move(name)), terminal_(isatty(STDERR_FILENO) != 0), start_(Clock::now()), last_(start_) {}
+  explicit ProgressLine(std::string name)
+      : name_(std::move(name)), terminal_(isatty(STDERR_FILENO) != 0), start_(Clock::now()), last_(start_) {}
   void show(const Progress& p) {
     const auto now = Clock::now();
     const double since_s = std::chrono::duration<double>(now - last_).count();
@@ -116,8 +127,9 @@ class ProgressLine {
     last_ = now;
     shown_ = true;
     const double wall_s = std::chrono::duration<double>(now - start_).count();
-    fmt::print(stderr, "{}{:<12} {:3.0f} % of the way, {:6.0f} s flown, {:4.1f} m/s, {:3.0f} x real time{}", terminal_ ? "\r" : "", name_, 100.0 * p.done_ratio, p.time_s,
-               p.speed_mps, p.time_s / wall_s, terminal_ ? "   " : "\n");
+    fmt::print(stderr, "{}{:<12} {:3.0f} % of the way, {:6.0f} s flown, {:4.1f} m/s, {:3.0f} x real time{}",
+               terminal_ ? "\r" : "", name_, 100.0 * p.done_ratio, p.time_s, p.speed_mps, p.time_s / wall_s,
+               terminal_ ? "   " : "\n");
   }
   ~ProgressLine() {
     if (terminal_ && shown_) fmt::print(stderr, "\r{:80}\r", "");
@@ -141,7 +153,8 @@ report::Scene scene_of(const sitl::World& world, const std::string& title, doubl
   scene.start_W = world.start_W();
   scene.goal_W = world.goal_W();
   for (const sitl::Pillar& p : world.pillars()) scene.circles.push_back({p.x_m, p.y_m, p.radius_m});
-  for (const Aabb& b : world.boxes()) scene.rects.push_back({b.min_W.x(), b.min_W.y(), b.size().x(), b.size().y()});
+  for (const Aabb& b : world.boxes())
+    scene.rects.push_back({b.min_W.x(), b.min_W.y(), b.size().x(), b.size().y()});
   if (zone_m > 0.0) scene.zone_borders_m = {world.start_W().x() + zone_m, world.goal_W().x() - zone_m};
   const sitl::VoxelGrid& voxels = world.voxels();
   if (!voxels.empty()) {
@@ -167,7 +180,9 @@ report::Scene scene_of(const sitl::World& world, const std::string& title, doubl
   scene.heat_rows = static_cast<int>(size.y() / scene.heat_cell_m);
   for (int k = 0; k < scene.heat_rows; ++k) {
     for (int i = 0; i < scene.heat_columns; ++i) {
-      scene.heat_ratio.push_back(world.congestion_ratio(scene.bounds_W.min_W.x() + (i + 0.5) * scene.heat_cell_m, scene.bounds_W.min_W.y() + (k + 0.5) * scene.heat_cell_m));
+      scene.heat_ratio.push_back(
+          world.congestion_ratio(scene.bounds_W.min_W.x() + (i + 0.5) * scene.heat_cell_m,
+                                 scene.bounds_W.min_W.y() + (k + 0.5) * scene.heat_cell_m));
     }
   }
   return scene;
@@ -195,7 +210,8 @@ int fly(const Options& options) {
     env = options.world;
     title = fmt::format("{}, seed {}", options.world, seed);
   } else {
-    if (endpoints.start_W || endpoints.goal_W) throw InputError("--start and --goal go with --world FILE: the environments have their own");
+    if (endpoints.start_W || endpoints.goal_W)
+      throw InputError("--start and --goal go with --world FILE: the environments have their own");
     const sitl::NamedEnvironment named = sitl::environment(options.env);
     world = std::make_unique<sitl::World>(sitl::generate(named.knobs, mission, seed));
     env = fmt::format("{}", named.number);
@@ -229,12 +245,15 @@ int fly(const Options& options) {
     std::vector<report::MissionResult> results;
     for (const report::MissionReport& r : reports) results.push_back(r.result);
     fmt::print("{}\n\n{}", title, report::comparison_table(results));
-    for (const report::MissionResult& r : results) fmt::print("{:<12} state_hash {}, {:.0f} x real time\n", r.design, r.state_hash, r.real_time_factor);
+    for (const report::MissionResult& r : results)
+      fmt::print("{:<12} state_hash {}, {:.0f} x real time\n", r.design, r.state_hash, r.real_time_factor);
   }
   const auto colour = options.colour == "speed" ? report::PathColour::kSpeed : report::PathColour::kPrecision;
   std::string error;
   if (!options.trace.empty()) error = report::write_trace_csv(options.trace, reports);
-  if (error.empty() && !options.plot.empty()) error = report::write_file(options.plot, report::mission_svg(scene_of(*world, title, zone_m), reports, colour));
+  if (error.empty() && !options.plot.empty())
+    error = report::write_file(options.plot,
+                               report::mission_svg(scene_of(*world, title, zone_m), reports, colour));
   if (!error.empty()) throw InputError(error);
   if (!options.json && !options.plot.empty()) fmt::print("picture: {}\n", options.plot);
   if (!options.json && !options.trace.empty()) fmt::print("trace: {}\n", options.trace);
@@ -245,30 +264,52 @@ int fly(const Options& options) {
 
 void add_fly_command(CLI::App& app, std::function<int()>& run) {
   const auto options = std::make_shared<Options>();
-  CLI::App* fly_app = app.add_subcommand("fly", "Fly a mission in simulation: depth images, map, planner, dynamics, all real");
+  CLI::App* fly_app = app.add_subcommand(
+      "fly", "Fly a mission in simulation: depth images, map, planner, dynamics, all real");
   fly_app->footer(
       "Examples:\n"
       "  roborun fly                                   environment 14 with the aware design\n"
       "  roborun fly --design aware,static,static-fair --plot flight.svg\n"
       "  roborun fly --env 27 --seed 3 --profile host --json\n"
       "  roborun fly --world house.bt --start 1,2,1.5 --goal 9,4,1.5\n\n"
-      "Exit code: 0 every design reached the goal, 1 at least one did not (the table says why), 2 bad input.");
-  fly_app->add_option("--env", options->env, "Environment: 1 .. 27, or a name like density0.45-spread80-distance900")->capture_default_str();
-  fly_app->add_option("--mission", options->mission, "package_delivery or search_and_rescue")->capture_default_str();
-  fly_app->add_option("--design", options->design, "aware, static (0.5 m/s as published), static-fair; several with commas")->capture_default_str();
-  fly_app->add_option("--profile", options->profile, "What computing costs: paper (the authors' machine) or host (this one)")->capture_default_str();
-  fly_app->add_option("--host-factor", options->host_factor, "With --profile host: a machine this many times slower")->capture_default_str();
-  fly_app->add_option("--host-file", options->host_file, "With --profile host: where the measured costs are kept [~/.cache/roborun/host.toml]");
-  fly_app->add_option("--seed", options->seed, "Seed of world, noise, wind and planner")->capture_default_str();
+      "Exit code: 0 every design reached the goal, 1 at least one did not (the table says why), 2 bad "
+      "input.");
+  fly_app
+      ->add_option("--env", options->env,
+                   "Environment: 1 .. 27, or a name like density0.45-spread80-distance900")
+      ->capture_default_str();
+  fly_app->add_option("--mission", options->mission, "package_delivery or search_and_rescue")
+      ->capture_default_str();
+  fly_app
+      ->add_option("--design", options->design,
+                   "aware, static (0.5 m/s as published), static-fair; several with commas")
+      ->capture_default_str();
+  fly_app
+      ->add_option("--profile", options->profile,
+                   "What computing costs: paper (the authors' machine) or host (this one)")
+      ->capture_default_str();
+  fly_app
+      ->add_option("--host-factor", options->host_factor,
+                   "With --profile host: a machine this many times slower")
+      ->capture_default_str();
+  fly_app->add_option("--host-file", options->host_file,
+                      "With --profile host: where the measured costs are kept [~/.cache/roborun/host.toml]");
+  fly_app->add_option("--seed", options->seed, "Seed of world, noise, wind and planner")
+      ->capture_default_str();
   fly_app->add_option("--map", options->map, "own or octomap")->capture_default_str();
-  fly_app->add_option("--planner", options->planner, "own, ompl:RRTstar, ompl:InformedRRTstar, ompl:RRTConnect, ompl:BITstar")->capture_default_str();
+  fly_app
+      ->add_option("--planner", options->planner,
+                   "own, ompl:RRTstar, ompl:InformedRRTstar, ompl:RRTConnect, ompl:BITstar")
+      ->capture_default_str();
   fly_app->add_option("--world", options->world, "World from a file instead: .toml, or OctoMap .bt / .ot");
   fly_app->add_option("--start", options->start, "With --world: X,Y,Z in metres");
   fly_app->add_option("--goal", options->goal, "With --world: X,Y,Z in metres");
-  fly_app->add_option("--settings", options->settings, "Cameras, wind, battery, speed from a TOML file (see platform/app/README.md)");
+  fly_app->add_option("--settings", options->settings,
+                      "Cameras, wind, battery, speed from a TOML file (see platform/app/README.md)");
   fly_app->add_option("--trace", options->trace, "Write every decision to this CSV file");
   fly_app->add_option("--plot", options->plot, "Write a picture of the mission to this SVG file");
-  fly_app->add_option("--color", options->colour, "Colour of the paths: speed or precision")->capture_default_str();
+  fly_app->add_option("--color", options->colour, "Colour of the paths: speed or precision")
+      ->capture_default_str();
   fly_app->add_flag("--json", options->json, "One JSON object a design on standard output, nothing else");
   fly_app->callback([options, &run] { run = [options] { return fly(*options); }; });
 }

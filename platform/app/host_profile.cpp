@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <chrono>
-#include <functional>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <vector>
 
@@ -38,7 +38,10 @@ Measured measure() {
   const sitl::World world = sitl::generate(sitl::environment("14").knobs, sitl::Mission::kPackageDelivery, 1);
   sitl::DepthCameraConfig camera;
   camera.latency_s = 0.0;
-  const Aabb bounds_W{world.bounds_W().min_W - Vector3::Constant(3.0), world.bounds_W().max_W + Vector3::Constant(3.0)};
+  camera.pixel_dropout_ratio = 0.0;  // one scan must do: holes near the vehicle would end every plan at once
+  camera.frame_dropout_ratio = 0.0;
+  const Aabb bounds_W{world.bounds_W().min_W - Vector3::Constant(3.0),
+                      world.bounds_W().max_W + Vector3::Constant(3.0)};
   std::vector<std::byte> block(backend_bytes(bounds_W, camera) + stages::PointCloud::arena_bytes({}) + 4096);
   core::UnlimitedBudget unlimited;
   stages::Smoother smoother;
@@ -63,7 +66,8 @@ Measured measure() {
     cameras.reserve(mounts.size());
     std::vector<stages::PosedDepthFrame> frames;
     for (std::size_t i = 0; i < mounts.size(); ++i) {
-      cameras.emplace_back(world, camera, mounts[i], static_cast<std::uint64_t>(pose), static_cast<std::uint32_t>(i));
+      cameras.emplace_back(world, camera, mounts[i], static_cast<std::uint64_t>(pose),
+                           static_cast<std::uint32_t>(i));
       for (int n = 0; n < 5; ++n) cameras[i].expose(MonotonicTime{std::chrono::milliseconds(60 * n)}, X_WB);
       stages::PosedDepthFrame posed;
       if (cameras[i].read(posed.frame) != Status::kOk) continue;
@@ -107,7 +111,8 @@ Measured measure() {
     }
   }
   Measured m;
-  for (std::size_t i = 0; i < core::kStageCount; ++i) m.per_unit_s[i] = stage[i].units > 0.0 ? stage[i].s / stage[i].units : 0.0;
+  for (std::size_t i = 0; i < core::kStageCount; ++i)
+    m.per_unit_s[i] = stage[i].units > 0.0 ? stage[i].s / stage[i].units : 0.0;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t level = 0; level < kPrecisionLevels; ++level) {
       const Sum& one = level_sum[i][level];
@@ -120,9 +125,11 @@ Measured measure() {
 constexpr std::array<const char*, 3> kModelKey{"map_s_per_m3", "export_s_per_m3", "planner_s_per_m3"};
 
 std::string to_toml(const Measured& m) {
-  std::string text = "# What the stages of roborun cost on this machine; delete the file to measure again.\n[host]\n";
+  std::string text =
+      "# What the stages of roborun cost on this machine; delete the file to measure again.\n[host]\n";
   text += fmt::format("per_unit_s = [{:.6e}]\n", fmt::join(m.per_unit_s, ", "));
-  for (std::size_t i = 0; i < 3; ++i) text += fmt::format("{} = [{:.6e}]\n", kModelKey[i], fmt::join(m.per_m3_s[i], ", "));
+  for (std::size_t i = 0; i < 3; ++i)
+    text += fmt::format("{} = [{:.6e}]\n", kModelKey[i], fmt::join(m.per_m3_s[i], ", "));
   return text;
 }
 
@@ -135,7 +142,8 @@ Measured from_toml(const std::string& path, const std::string& text) {
   const auto read = [&](const char* key, auto& values) {
     const toml::node& node = reader.need(*table, key, "[host]");
     const toml::array* array = node.as_array();
-    if (array == nullptr || array->size() != values.size()) reader.refuse(node, key, fmt::format("must be {} numbers", values.size()));
+    if (array == nullptr || array->size() != values.size())
+      reader.refuse(node, key, fmt::format("must be {} numbers", values.size()));
     for (std::size_t i = 0; i < values.size(); ++i) {
       values[i] = reader.number((*array)[i], key);
       if (values[i] < 0.0) reader.refuse(node, key, "must not be negative");
@@ -152,14 +160,17 @@ Measured from_toml(const std::string& path, const std::string& text) {
 Profile paper() {
   Profile profile;
   profile.costs = core::paper_profile();
-  profile.model = {governor::from_cost(profile.costs.of(core::StageId::kMap)), governor::from_cost(profile.costs.of(core::StageId::kExport)),
+  profile.model = {governor::from_cost(profile.costs.of(core::StageId::kMap)),
+                   governor::from_cost(profile.costs.of(core::StageId::kExport)),
                    governor::from_cost(profile.costs.of(core::StageId::kPlanner))};
   return profile;
 }
 
 std::string default_host_path() {
-  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache != '\0') return fmt::format("{}/roborun/host.toml", cache);
-  if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0') return fmt::format("{}/.cache/roborun/host.toml", home);
+  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache != '\0')
+    return fmt::format("{}/roborun/host.toml", cache);
+  if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
+    return fmt::format("{}/.cache/roborun/host.toml", home);
   return "roborun-host.toml";
 }
 
@@ -175,12 +186,15 @@ Profile host(const std::string& path, double factor, std::string& note) {
     std::error_code ignored;
     std::filesystem::create_directories(std::filesystem::path(path).parent_path(), ignored);
     const std::string error = report::write_file(path, text);
-    note = error.empty() ? fmt::format("measured this machine once, kept in {}", path) : fmt::format("measured this machine for this run only: {}", error);
+    note = error.empty() ? fmt::format("measured this machine once, kept in {}", path)
+                         : fmt::format("measured this machine for this run only: {}", error);
   }
   Profile profile;
-  for (std::size_t i = 0; i < core::kStageCount; ++i) profile.costs.stage[i].per_unit_s = factor * m.per_unit_s[i];
+  for (std::size_t i = 0; i < core::kStageCount; ++i)
+    profile.costs.stage[i].per_unit_s = factor * m.per_unit_s[i];
   for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t level = 0; level < kPrecisionLevels; ++level) profile.model[i].slope_s_per_m3[level] = factor * m.per_m3_s[i][level];
+    for (std::size_t level = 0; level < kPrecisionLevels; ++level)
+      profile.model[i].slope_s_per_m3[level] = factor * m.per_m3_s[i][level];
   }
   return profile;
 }

@@ -17,10 +17,10 @@ struct Profile {
 /// The authors' machine; the governor's model is the profile itself.
 [[nodiscard]] Profile paper();
 
-/// Seconds per unit of work of each stage, and per volume at each precision, times `factor`: a slower board is a factor
-/// above 1. Measured once (about a second) on environment 14, and kept in `path`, because a run must repeat: the same file
-/// gives the same state_hash. A missing file is measured and written, which `note` says; one that cannot be written is
-/// used for this run only. Throws sitl::InputError for a malformed file.
+/// Seconds per unit of work of each stage, and per volume at each precision, times `factor`: a slower board
+/// is a factor above 1. Measured once (about a second) on environment 14, and kept in `path`, because a run
+/// must repeat: the same file gives the same state_hash. A missing file is measured and written, which `note`
+/// says; one that cannot be written is used for this run only. Throws sitl::InputError for a malformed file.
 [[nodiscard]] Profile host(const std::string& path, double factor, std::string& note);
 /// $XDG_CACHE_HOME/roborun/host.toml, or below $HOME/.cache, or in the working folder.
 [[nodiscard]] std::string default_host_path();

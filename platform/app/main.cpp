@@ -1,4 +1,5 @@
-/// The one program. Every subcommand teaches itself with --help; bad input is one line on stderr and exit code 2.
+/// The one program. Every subcommand teaches itself with --help; bad input is one line on stderr and exit
+/// code 2.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>

@@ -12,8 +12,8 @@
 #include "core/geometry/math.hpp"
 #include "core/memory/arena.hpp"
 #include "core/record/state_hash.hpp"
-#include "platform/app/decision_pipeline.hpp"
 #include "platform/app/backends.hpp"
+#include "platform/app/decision_pipeline.hpp"
 #include "platform/app/flight_lane.hpp"
 #include "platform/sitl/world/input_error.hpp"
 
@@ -95,7 +95,8 @@ class MissionRun {
 MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
     : world_(world),
       config_(config),
-      vehicle_(config.vehicle, config.wind, Vector3(world.start_W().x(), world.start_W().y(), 0.0), config.seed),
+      vehicle_(config.vehicle, config.wind, Vector3(world.start_W().x(), world.start_W().y(), 0.0),
+               config.seed),
       sensors_(config.sensors, config.seed),
       flight_({}, {}) {
   const auto mounts = sitl::six_camera_mounts();
@@ -105,14 +106,16 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
   }
   PipelineConfig pipeline;
   pipeline.flight_bounds_W = world.bounds_W();
-  pipeline.map_bounds_W = {world.bounds_W().min_W - Vector3::Constant(kMapMargin_m), world.bounds_W().max_W + Vector3::Constant(kMapMargin_m)};
+  pipeline.map_bounds_W = {world.bounds_W().min_W - Vector3::Constant(kMapMargin_m),
+                           world.bounds_W().max_W + Vector3::Constant(kMapMargin_m)};
   pipeline.horizon_m = config.camera.range_m - 1.0;
 
   const std::size_t cloud_bytes = stages::PointCloud::arena_bytes({});
   block_.resize(cloud_bytes + backend_bytes(pipeline.map_bounds_W, config.camera) + 4096);
   arena_.emplace(block_);
   cloud_.emplace(stages::PointCloud::Config{}, *arena_);
-  backends_ = make_backends(config.map_backend, config.planner_backend, pipeline.map_bounds_W, config.camera, *arena_);
+  backends_ = make_backends(config.map_backend, config.planner_backend, pipeline.map_bounds_W, config.camera,
+                            *arena_);
   if (arena_->exhausted()) throw sitl::InputError("memory plan: the arena is too small for this world");
 
   const auto cost_of = [&config](core::StageId id) { return seconds(config.costs.cost(id, {})); };
@@ -124,11 +127,13 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
   g.smoother_s = cost_of(core::StageId::kSmoother);
   g.v_max_mps = config.v_max_mps;
   const double height_m = pipeline.map_bounds_W.size().z();
-  g.sensor_volume_max_m3 = 4.0 * config.camera.range_m * config.camera.range_m * std::min(height_m, 2.0 * config.camera.range_m);
+  g.sensor_volume_max_m3 =
+      4.0 * config.camera.range_m * config.camera.range_m * std::min(height_m, 2.0 * config.camera.range_m);
   g.coarsest_level = coarsest_level_within(world.bounds_W().size().z() / 3.0);
   g.minor_frame = kMinorFrame;
   governor_.emplace(g);
-  pipeline_.emplace(pipeline, config.costs, *governor_, *cloud_, *backends_.map, *backends_.planner, smoother_);
+  pipeline_.emplace(pipeline, config.costs, *governor_, *cloud_, *backends_.map, *backends_.planner,
+                    smoother_);
 }
 
 void MissionRun::step_world() {
@@ -141,12 +146,16 @@ void MissionRun::step_world() {
 
 void MissionRun::start_decision() {
   stages::EstimatedState state;
-  if (now_ < next_decision_ || pending_ || flight_.estimator().state(state) != Status::kOk || !flight_.airborne()) return;
+  if (now_ < next_decision_ || pending_ || flight_.estimator().state(state) != Status::kOk ||
+      !flight_.airborne())
+    return;
   core::StaticVector<stages::PosedDepthFrame, 8> frames;
   for (sitl::SimulatedDepthCamera& camera : cameras_) {
     stages::PosedDepthFrame posed;
     Pose X_WB;
-    if (camera.read(posed.frame) != Status::kOk || flight_.estimator().pose_at(posed.frame.stamp, X_WB) != Status::kOk) continue;
+    if (camera.read(posed.frame) != Status::kOk ||
+        flight_.estimator().pose_at(posed.frame.stamp, X_WB) != Status::kOk)
+      continue;
     const firmware_if::CameraMount& mount = camera.mount();
     Matrix3 R_BC;
     Vector3 p_BC;
@@ -288,7 +297,8 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
     hash_.add(s.v_WB);
     if (frame % 40 == 0) report_.path.push_back({seconds(now_.time_since_epoch()), s.p_WB, s.v_WB.norm()});
     if (frame % 400 == 0 && progress) {
-      progress({seconds(now_.time_since_epoch()), std::clamp(1.0 - (world_.goal_W() - s.p_WB).norm() / whole_m, 0.0, 1.0), s.v_WB.norm()});
+      progress({seconds(now_.time_since_epoch()),
+                std::clamp(1.0 - (world_.goal_W() - s.p_WB).norm() / whole_m, 0.0, 1.0), s.v_WB.norm()});
     }
     reason = end_reason();
   }
@@ -299,7 +309,8 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
 
 }  // namespace
 
-report::MissionReport fly_mission(const sitl::World& world, const MissionConfig& config, const std::function<void(const Progress&)>& progress) {
+report::MissionReport fly_mission(const sitl::World& world, const MissionConfig& config,
+                                  const std::function<void(const Progress&)>& progress) {
   const auto run = std::make_unique<MissionRun>(world, config);
   return run->fly(progress);
 }

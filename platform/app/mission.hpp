@@ -39,9 +39,10 @@ struct Progress {
   double speed_mps{};
 };
 
-/// Flies from the world's start (on the ground) to its goal. Deterministic: the same config, world and build give the same
-/// report, but for real_time_factor. `progress` (may be empty) is called about once a second of virtual time.
-/// result.env, mission and profile are left to the caller. Throws sitl::InputError for an unknown backend.
+/// Flies from the world's start (on the ground) to its goal. Deterministic: the same config, world and build
+/// give the same report, but for real_time_factor. `progress` (may be empty) is called about once a second of
+/// virtual time. result.env, mission and profile are left to the caller. Throws sitl::InputError for an
+/// unknown backend.
 [[nodiscard]] report::MissionReport fly_mission(const sitl::World& world, const MissionConfig& config,
                                                 const std::function<void(const Progress&)>& progress);
 

@@ -14,15 +14,18 @@ struct Range {
 };
 
 /// A number within [low, high] into `value`, if the key is there.
-void read(const sitl::TomlReader& reader, const toml::table& table, const char* key, Range range, double& value) {
+void read(const sitl::TomlReader& reader, const toml::table& table, const char* key, Range range,
+          double& value) {
   const toml::node* node = table.get(key);
   if (node == nullptr) return;
   const auto raw = node->is_integer() || node->is_floating_point() ? node->value<double>() : std::nullopt;
-  if (!raw || !(*raw >= range.low && *raw <= range.high)) reader.refuse(*node, key, fmt::format("must be a number from {} to {}", range.low, range.high));
+  if (!raw || !(*raw >= range.low && *raw <= range.high))
+    reader.refuse(*node, key, fmt::format("must be a number from {} to {}", range.low, range.high));
   value = *raw;
 }
 
-const toml::table* section(const sitl::TomlReader& reader, const toml::table& root, const char* name, const std::set<std::string_view>& keys) {
+const toml::table* section(const sitl::TomlReader& reader, const toml::table& root, const char* name,
+                           const std::set<std::string_view>& keys) {
   const toml::node* node = root.get(name);
   if (node == nullptr) return nullptr;
   if (node->as_table() == nullptr) reader.refuse(*node, name, fmt::format("must be a table: [{}]", name));
@@ -39,7 +42,9 @@ void load_settings(const std::string& path, MissionConfig& config) {
   const sitl::TomlReader reader(path);
   reader.allow_keys(root, "the file", {"camera", "wind", "battery", "flight"});
 
-  if (const toml::table* t = section(reader, root, "camera", {"pixels", "range_m", "rate_Hz", "latency_s", "noise_m", "noise_per_m", "pixel_dropout_ratio", "frame_dropout_ratio"})) {
+  if (const toml::table* t = section(reader, root, "camera",
+                                     {"pixels", "range_m", "rate_Hz", "latency_s", "noise_m", "noise_per_m",
+                                      "pixel_dropout_ratio", "frame_dropout_ratio"})) {
     sitl::DepthCameraConfig& c = config.camera;
     double pixels = c.pixels;
     read(reader, *t, "pixels", {8, 512}, pixels);
@@ -59,7 +64,8 @@ void load_settings(const std::string& path, MissionConfig& config) {
     }
     read(reader, *t, "gust_mps", {0, 10}, config.wind.gust_mps);
   }
-  if (const toml::table* t = section(reader, root, "battery", {"capacity_J"})) read(reader, *t, "capacity_J", {1e3, 1e9}, config.vehicle.battery_J);
+  if (const toml::table* t = section(reader, root, "battery", {"capacity_J"}))
+    read(reader, *t, "capacity_J", {1e3, 1e9}, config.vehicle.battery_J);
   if (const toml::table* t = section(reader, root, "flight", {"v_max_mps", "time_limit_s"})) {
     read(reader, *t, "v_max_mps", {0.5, 12}, config.v_max_mps);
     read(reader, *t, "time_limit_s", {1, 100000}, config.time_limit_s);

@@ -22,10 +22,14 @@ std::string to_json(const MissionResult& r) {
   json["energy_kJ"] = number(r.energy_kJ);
   json["decisions"] = r.decisions;
   json["deadline_misses"] = r.deadline_misses;
-  json["latency_s"] = {{"median", number(r.latency_s.median)}, {"p99", number(r.latency_s.p99)}, {"max", number(r.latency_s.max)}};
+  json["latency_s"] = {{"median", number(r.latency_s.median)},
+                       {"p99", number(r.latency_s.p99)},
+                       {"max", number(r.latency_s.max)}};
   json["cpu_s"] = number(r.cpu_s);
   json["cpu_utilization_ratio"] = number(r.cpu_utilization_ratio);
-  json["precision_m"] = {{"min", number(r.precision_m.min)}, {"median", number(r.precision_m.median)}, {"max", number(r.precision_m.max)}};
+  json["precision_m"] = {{"min", number(r.precision_m.min)},
+                         {"median", number(r.precision_m.median)},
+                         {"max", number(r.precision_m.max)}};
   json["real_time_factor"] = number(r.real_time_factor);
   json["map_bytes"] = r.map_bytes;
   json["state_hash"] = r.state_hash;

@@ -43,7 +43,7 @@ struct MissionResult {
   std::string map;
   std::string planner;
   std::string mission;
-  std::string reason;      ///< Why the mission ended.
+  std::string reason;        ///< Why the mission ended.
   double speed_limit_mps{};  ///< v_max of the design.
 };
 

@@ -16,7 +16,8 @@ constexpr double kChartHeight = 90.0;
 constexpr double kMaxPanel = 330.0;
 constexpr const char* kInk = "#1f2933";
 constexpr const char* kSoft = "#7b8794";
-constexpr std::array<const char*, 4> kDesignColour{"#0072b2", "#d55e00", "#009e73", "#cc79a7"};  // Okabe and Ito
+constexpr std::array<const char*, 4> kDesignColour{"#0072b2", "#d55e00", "#009e73",
+                                                   "#cc79a7"};  // Okabe and Ito
 
 struct Rgb {
   int r, g, b;
@@ -29,7 +30,9 @@ Rgb ramp(double ratio) {
   const double at = std::clamp(ratio, 0.0, 1.0) * (kStops.size() - 1);
   const auto i = std::min(static_cast<std::size_t>(at), kStops.size() - 2);
   const double share = at - static_cast<double>(i);
-  const auto mix = [&](std::size_t c) { return static_cast<int>(kStops[i][c] + share * (kStops[i + 1][c] - kStops[i][c])); };
+  const auto mix = [&](std::size_t c) {
+    return static_cast<int>(kStops[i][c] + share * (kStops[i + 1][c] - kStops[i][c]));
+  };
   return {mix(0), mix(1), mix(2)};
 }
 
@@ -39,11 +42,20 @@ std::string escape(const std::string& raw) {
   std::string text;
   for (const char c : raw) {
     switch (c) {
-      case '&': text += "&amp;"; break;
-      case '<': text += "&lt;"; break;
-      case '>': text += "&gt;"; break;
-      case '"': text += "&quot;"; break;
-      default: text += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+      case '&':
+        text += "&amp;";
+        break;
+      case '<':
+        text += "&lt;";
+        break;
+      case '>':
+        text += "&gt;";
+        break;
+      case '"':
+        text += "&quot;";
+        break;
+      default:
+        text += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
     }
   }
   return text;
@@ -56,8 +68,10 @@ class Svg {
     fmt::format_to(std::back_inserter(body_), format, std::forward<Args>(args)...);
     body_ += '\n';
   }
-  void text(double x, double y, const std::string& what, const char* anchor = "start", double size = 13, const char* fill = kInk, const char* weight = "normal") {
-    add(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="{}" font-size="{}" fill="{}" font-weight="{}">{}</text>)", x, y, anchor, size, fill, weight, escape(what));
+  void text(double x, double y, const std::string& what, const char* anchor = "start", double size = 13,
+            const char* fill = kInk, const char* weight = "normal") {
+    add(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="{}" font-size="{}" fill="{}" font-weight="{}">{}</text>)",
+        x, y, anchor, size, fill, weight, escape(what));
   }
   [[nodiscard]] std::string finish(double height) const {
     return fmt::format(
@@ -90,7 +104,8 @@ double nice_step(double span) {
 
 void draw_world(Svg& svg, const Scene& scene, const Frame& f, double height) {
   const Vector3 size = scene.bounds_W.size();
-  svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="#f7f9fb" stroke="#cbd2d9"/>)", f.left, f.top, size.x() * f.scale, height);
+  svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="#f7f9fb" stroke="#cbd2d9"/>)",
+          f.left, f.top, size.x() * f.scale, height);
   const double cell = scene.heat_cell_m * f.scale;
   for (int k = 0; k < scene.heat_rows; ++k) {
     for (int i = 0; i < scene.heat_columns; ++i) {
@@ -98,33 +113,43 @@ void draw_world(Svg& svg, const Scene& scene, const Frame& f, double height) {
       if (ratio < 0.02) continue;
       const double x = f.x(scene.bounds_W.min_W.x() + i * scene.heat_cell_m);
       const double y = f.y(scene.bounds_W.min_W.y() + (k + 1) * scene.heat_cell_m);
-      svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="#c0392b" fill-opacity="{:.2f}"/>)", x, y,
-              std::min(cell, f.x(scene.bounds_W.max_W.x()) - x), std::min(cell, cell), 0.04 + 0.5 * std::min(ratio, 0.6));
+      svg.add(
+          R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="#c0392b" fill-opacity="{:.2f}"/>)",
+          x, y, std::min(cell, f.x(scene.bounds_W.max_W.x()) - x), std::min(cell, cell),
+          0.04 + 0.5 * std::min(ratio, 0.6));
     }
   }
   for (const Scene::Rect& r : scene.rects) {
-    svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.2f}" height="{:.2f}" fill="#3e4c59"/>)", f.x(r.x_m), f.y(r.y_m + r.height_m), r.width_m * f.scale, r.height_m * f.scale);
+    svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.2f}" height="{:.2f}" fill="#3e4c59"/>)", f.x(r.x_m),
+            f.y(r.y_m + r.height_m), r.width_m * f.scale, r.height_m * f.scale);
   }
   for (const Scene::Circle& c : scene.circles) {
-    svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="{:.2f}" fill="#3e4c59"/>)", f.x(c.x_m), f.y(c.y_m), std::max(c.radius_m * f.scale, 0.8));
+    svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="{:.2f}" fill="#3e4c59"/>)", f.x(c.x_m), f.y(c.y_m),
+            std::max(c.radius_m * f.scale, 0.8));
   }
   const std::array<const char*, 3> zone{"A", "B", "C"};
   std::vector<double> borders{scene.bounds_W.min_W.x()};
   borders.insert(borders.end(), scene.zone_borders_m.begin(), scene.zone_borders_m.end());
   borders.push_back(scene.bounds_W.max_W.x());
   for (std::size_t i = 1; i + 1 < borders.size(); ++i) {
-    svg.add(R"(<line x1="{0:.1f}" x2="{0:.1f}" y1="{1:.1f}" y2="{2:.1f}" stroke="{3}" stroke-dasharray="6 5"/>)", f.x(borders[i]), f.top, f.top + height, kSoft);
+    svg.add(
+        R"(<line x1="{0:.1f}" x2="{0:.1f}" y1="{1:.1f}" y2="{2:.1f}" stroke="{3}" stroke-dasharray="6 5"/>)",
+        f.x(borders[i]), f.top, f.top + height, kSoft);
   }
   for (std::size_t i = 0; borders.size() == 4 && i < 3; ++i) {
-    svg.text(f.x(0.5 * (borders[i] + borders[i + 1])), f.top + 18, fmt::format("zone {}", zone[i]), "middle", 13, kSoft);
+    svg.text(f.x(0.5 * (borders[i] + borders[i + 1])), f.top + 18, fmt::format("zone {}", zone[i]), "middle",
+             13, kSoft);
   }
   const double step = nice_step(size.x());
-  for (double x_m = std::ceil(scene.bounds_W.min_W.x() / step) * step; x_m <= scene.bounds_W.max_W.x(); x_m += step) {
-    svg.add(R"(<line x1="{0:.1f}" x2="{0:.1f}" y1="{1:.1f}" y2="{2:.1f}" stroke="{3}"/>)", f.x(x_m), f.top + height, f.top + height + 4, kSoft);
-    svg.text(f.x(x_m), f.top + height + 17, fmt::format("{:g} m", x_m), "middle", 11, kSoft);
+  for (double x_m = std::ceil(scene.bounds_W.min_W.x() / step) * step; x_m <= scene.bounds_W.max_W.x();
+       x_m += step) {
+    svg.add(R"(<line x1="{0:.1f}" x2="{0:.1f}" y1="{1:.1f}" y2="{2:.1f}" stroke="{3}"/>)", f.x(x_m),
+            f.top + height, f.top + height + 4, kSoft);
+    svg.text(f.x(x_m), f.top + height + 17, fmt::format("{:g} m", x_m + 0.0), "middle", 11, kSoft);
   }
-  for (double y_m = std::ceil(scene.bounds_W.min_W.y() / 50.0) * 50.0; y_m <= scene.bounds_W.max_W.y(); y_m += 50.0) {
-    svg.text(f.left - 8, f.y(y_m) + 4, fmt::format("{:g} m", y_m), "end", 11, kSoft);
+  for (double y_m = std::ceil(scene.bounds_W.min_W.y() / 50.0) * 50.0; y_m <= scene.bounds_W.max_W.y();
+       y_m += 50.0) {
+    svg.text(f.left - 8, f.y(y_m) + 4, fmt::format("{:g} m", y_m + 0.0), "end", 11, kSoft);
   }
 }
 
@@ -139,7 +164,8 @@ double precision_at(const MissionReport& mission, double time_s) {
 
 /// 0 .. 1 in 24 steps, so that neighbouring points share a colour and a polyline.
 int colour_step(const MissionReport& mission, const PathPoint& point, PathColour colour, double top_mps) {
-  if (colour == PathColour::kSpeed) return static_cast<int>(std::lround(24.0 * std::clamp(point.speed_mps / top_mps, 0.0, 1.0)));
+  if (colour == PathColour::kSpeed)
+    return static_cast<int>(std::lround(24.0 * std::clamp(point.speed_mps / top_mps, 0.0, 1.0)));
   const double p0_m = precision_at(mission, point.time_s);
   if (p0_m <= 0.0) return 0;
   return static_cast<int>(std::lround(24.0 * std::clamp(std::log2(p0_m / 0.3) / 5.0, 0.0, 1.0)));
@@ -149,7 +175,9 @@ void draw_path(Svg& svg, const MissionReport& mission, const Frame& f, PathColou
   std::string points;
   int step = -1;
   const auto flush = [&] {
-    if (!points.empty()) svg.add(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="2.6" stroke-linejoin="round"/>)", points, hex(ramp(step / 24.0)));
+    if (!points.empty())
+      svg.add(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="2.6" stroke-linejoin="round"/>)",
+              points, hex(ramp(step / 24.0)));
     points.clear();
   };
   Vector3 last_W = Vector3::Constant(1e9);
@@ -175,32 +203,40 @@ struct Series {
   double (*value)(const DecisionRecord&);
 };
 
-void draw_chart(Svg& svg, std::span<const MissionReport> missions, const Series& series, const Frame& f, double right, double top) {
+void draw_chart(Svg& svg, std::span<const MissionReport> missions, const Series& series, const Frame& f,
+                double right, double top) {
   const double left = f.left;
-  svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="#ffffff" stroke="#cbd2d9"/>)", left, top, right - left, kChartHeight);
+  svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="#ffffff" stroke="#cbd2d9"/>)",
+          left, top, right - left, kChartHeight);
   svg.text(left, top - 6, series.label, "start", 12, kInk, "bold");
   constexpr double kLow = 0.1;
   const auto y_of = [&](double value) {
-    const double ratio = series.logarithmic ? std::log10(std::max(value, kLow) / kLow) / std::log10(series.top / kLow) : value / series.top;
+    const double ratio = series.logarithmic
+                             ? std::log10(std::max(value, kLow) / kLow) / std::log10(series.top / kLow)
+                             : value / series.top;
     return top + kChartHeight * (1.0 - std::clamp(ratio, 0.0, 1.0));
   };
   if (series.logarithmic) {
     for (double tick = kLow; tick <= series.top * 1.001; tick *= 10.0) {
-      svg.add(R"(<line x1="{0:.1f}" x2="{1:.1f}" y1="{2:.1f}" y2="{2:.1f}" stroke="#e4e7eb"/>)", left, right, y_of(tick));
+      svg.add(R"(<line x1="{0:.1f}" x2="{1:.1f}" y1="{2:.1f}" y2="{2:.1f}" stroke="#e4e7eb"/>)", left, right,
+              y_of(tick));
       svg.text(left - 6, y_of(tick) + 4, fmt::format("{:g}", tick), "end", 11, kSoft);
     }
   } else {
     for (const double tick : {0.0, 0.5 * series.top, series.top}) {
-      svg.add(R"(<line x1="{0:.1f}" x2="{1:.1f}" y1="{2:.1f}" y2="{2:.1f}" stroke="#e4e7eb"/>)", left, right, y_of(tick));
+      svg.add(R"(<line x1="{0:.1f}" x2="{1:.1f}" y1="{2:.1f}" y2="{2:.1f}" stroke="#e4e7eb"/>)", left, right,
+              y_of(tick));
       svg.text(left - 6, y_of(tick) + 4, fmt::format("{:g}", tick), "end", 11, kSoft);
     }
   }
   for (std::size_t m = 0; m < missions.size(); ++m) {
     std::string points;
     for (const DecisionRecord& d : missions[m].decisions) {
-      fmt::format_to(std::back_inserter(points), "{:.1f},{:.1f} ", std::clamp(f.x(d.p_WB.x()), left, right), y_of(series.value(d)));
+      fmt::format_to(std::back_inserter(points), "{:.1f},{:.1f} ", std::clamp(f.x(d.p_WB.x()), left, right),
+                     y_of(series.value(d)));
     }
-    svg.add(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="1.3" stroke-opacity="0.85"/>)", points, kDesignColour[m % kDesignColour.size()]);
+    svg.add(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="1.3" stroke-opacity="0.85"/>)",
+            points, kDesignColour[m % kDesignColour.size()]);
   }
 }
 
@@ -208,13 +244,16 @@ void draw_legend(Svg& svg, PathColour colour, double top_mps, double right, doub
   const double width = 240.0;
   const double left = right - width;
   for (int i = 0; i <= 24; ++i) {
-    svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="10" fill="{}"/>)", left + i * width / 25.0, y, width / 25.0 + 0.5, hex(ramp(i / 24.0)));
+    svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="10" fill="{}"/>)", left + i * width / 25.0,
+            y, width / 25.0 + 0.5, hex(ramp(i / 24.0)));
   }
   const bool speed = colour == PathColour::kSpeed;
   svg.text(left - 8, y + 10, speed ? "path: speed, m/s" : "path: precision p0, m", "end", 12, kInk);
   for (int i = 0; i <= (speed ? 4 : 5); ++i) {
     const double ratio = speed ? i / 4.0 : i / 5.0;
-    svg.text(left + ratio * width, y + 23, speed ? fmt::format("{:.3g}", ratio * top_mps) : fmt::format("{:g}", 0.3 * (1 << i)), "middle", 11, kSoft);
+    svg.text(left + ratio * width, y + 23,
+             speed ? fmt::format("{:.3g}", ratio * top_mps) : fmt::format("{:g}", 0.3 * (1 << i)), "middle",
+             11, kSoft);
   }
 }
 
@@ -229,35 +268,47 @@ std::string mission_svg(const Scene& scene, std::span<const MissionReport> missi
   double top_mps = 1.0;
   for (const MissionReport& m : missions) top_mps = std::max(top_mps, std::ceil(m.result.max_velocity_mps));
 
-  svg.text(kLeft, 34, scene.title, "start", 20, kInk, "bold");
-  draw_legend(svg, colour, top_mps, kWidth - kRight, 22);
-  double y = 84;
+  svg.text(kLeft, 34, scene.title, "start", 18, kInk, "bold");
+  draw_legend(svg, colour, top_mps, kWidth - kRight, 48);
+  double y = 96;
   for (std::size_t i = 0; i < missions.size(); ++i) {
     const MissionResult& r = missions[i].result;
-    svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="12" height="12" rx="2" fill="{}"/>)", kLeft, y - 11, kDesignColour[i % kDesignColour.size()]);
+    svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="12" height="12" rx="2" fill="{}"/>)", kLeft, y - 11,
+            kDesignColour[i % kDesignColour.size()]);
     svg.text(kLeft + 18, y, r.design, "start", 15, kInk, "bold");
-    svg.text(kLeft + 130, y,
-             fmt::format("{} in {:.0f} s, mean {:.2f} m/s, {:.0f} kJ, {} decisions of {:.2f} s median, {} late", r.reason == "reached_goal" ? "reached the goal" : r.reason,
-                         r.mission_time_s, r.mean_velocity_mps, r.energy_kJ, r.decisions, r.latency_s.median, r.deadline_misses),
-             "start", 13, kInk);
+    svg.text(
+        kLeft + 130, y,
+        fmt::format("{} in {:.0f} s, mean {:.2f} m/s, {:.0f} kJ, {} decisions of {:.2f} s median, {} late",
+                    r.reason == "reached_goal" ? "reached the goal" : r.reason, r.mission_time_s,
+                    r.mean_velocity_mps, r.energy_kJ, r.decisions, r.latency_s.median, r.deadline_misses),
+        "start", 13, kInk);
     const Frame f{scene.bounds_W.min_W.x(), scene.bounds_W.max_W.y(), scale, kLeft, y + 10};
     draw_world(svg, scene, f, panel);
     draw_path(svg, missions[i], f, colour, top_mps);
-    svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="6" fill="#ffffff" stroke="{}" stroke-width="2.5"/>)", f.x(scene.start_W.x()), f.y(scene.start_W.y()), kInk);
-    svg.add(R"(<path d="M {0:.1f} {1:.1f} l 0 -18 l 13 5 l -13 5" fill="#e12d39" stroke="{2}" stroke-width="1.5"/>)", f.x(scene.goal_W.x()), f.y(scene.goal_W.y()), kInk);
+    svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="6" fill="#ffffff" stroke="{}" stroke-width="2.5"/>)",
+            f.x(scene.start_W.x()), f.y(scene.start_W.y()), kInk);
+    svg.add(
+        R"(<path d="M {0:.1f} {1:.1f} l 0 -18 l 13 5 l -13 5" fill="#e12d39" stroke="{2}" stroke-width="1.5"/>)",
+        f.x(scene.goal_W.x()), f.y(scene.goal_W.y()), kInk);
     y += panel + 62;
   }
   const Frame charts{scene.bounds_W.min_W.x(), 0.0, scale, kLeft, 0.0};
   double longest_s = 1.0;
   for (const MissionReport& m : missions) longest_s = std::max(longest_s, m.result.latency_s.max);
-  const std::array<Series, 3> series{{{"speed at each decision, m/s", top_mps, false, [](const DecisionRecord& d) { return d.speed_mps; }},
-                                      {"latency of each decision, s (logarithmic)", longest_s > 10.0 ? 100.0 : 10.0, true, [](const DecisionRecord& d) { return d.latency_s; }},
-                                      {"precision p0, m (logarithmic; lower is finer)", 10.0, true, [](const DecisionRecord& d) { return d.p0_m; }}}};
+  const std::array<Series, 3> series{
+      {{"speed at each decision, m/s", top_mps, false, [](const DecisionRecord& d) { return d.speed_mps; }},
+       {"latency of each decision, s (logarithmic)", longest_s > 10.0 ? 100.0 : 10.0, true,
+        [](const DecisionRecord& d) { return d.latency_s; }},
+       {"precision p0, m (logarithmic; lower is finer)", 10.0, true,
+        [](const DecisionRecord& d) { return d.p0_m; }}}};
   for (const Series& s : series) {
     draw_chart(svg, missions, s, charts, right, y);
     y += kChartHeight + 34;
   }
-  svg.text(kLeft, y - 12, "charts: over the way from start to goal, colours as the squares above; dark circles and boxes: obstacles; red: congestion", "start", 12, kSoft);
+  svg.text(kLeft, y - 12,
+           "charts: over the way from start to goal, colours as the squares above; dark circles and boxes: "
+           "obstacles; red: congestion",
+           "start", 12, kSoft);
   return svg.finish(y + 4);
 }
 

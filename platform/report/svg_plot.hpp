@@ -25,7 +25,8 @@ struct Scene {
   Vector3 goal_W = Vector3::Zero();
   std::vector<Circle> circles;
   std::vector<Rect> rects;
-  /// Zones A | B | C: where the congested ends stop, x of the two dashed lines; empty if the world has no zones.
+  /// Zones A | B | C: where the congested ends stop, x of the two dashed lines; empty if the world has no
+  /// zones.
   std::vector<double> zone_borders_m;
   /// Heat map: ratio 0 .. 1 of cell (i, k) at [k * columns + i], from bounds_W.min_W, square cells.
   double heat_cell_m{10.0};
@@ -36,8 +37,9 @@ struct Scene {
 
 enum class PathColour { kSpeed, kPrecision };
 
-/// A complete SVG file without external resources. One panel a mission, true to scale, the path coloured by speed or by
-/// precision with a legend; below it speed, latency and precision over the way of all missions.
-[[nodiscard]] std::string mission_svg(const Scene& scene, std::span<const MissionReport> missions, PathColour colour);
+/// A complete SVG file without external resources. One panel a mission, true to scale, the path coloured by
+/// speed or by precision with a legend; below it speed, latency and precision over the way of all missions.
+[[nodiscard]] std::string mission_svg(const Scene& scene, std::span<const MissionReport> missions,
+                                      PathColour colour);
 
 }  // namespace roborun::report

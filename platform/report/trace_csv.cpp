@@ -30,18 +30,25 @@ std::string write_file(const std::string& path, const std::string& text) {
 
 std::string write_trace_csv(const std::string& path, std::span<const MissionReport> missions) {
   std::string text =
-      "design,seed,time_s,x_m,y_m,z_m,speed_mps,speed_limit_mps,p0_m,p1_m,v0_m3,v1_m3,v2_m3,time_budget_s,budget_source,"
+      "design,seed,time_s,x_m,y_m,z_m,speed_mps,speed_limit_mps,p0_m,p1_m,v0_m3,v1_m3,v2_m3,time_budget_s,"
+      "budget_source,"
       "deadline_s,latency_s";
-  for (std::size_t i = 0; i < core::kStageCount; ++i) text += fmt::format(",{}_s", core::to_string(static_cast<core::StageId>(i)));
-  text += ",visible_m,closest_obstacle_m,gap_average_m,sensor_volume_m3,map_volume_m3,planner,smoother,missed\n";
+  for (std::size_t i = 0; i < core::kStageCount; ++i)
+    text += fmt::format(",{}_s", core::to_string(static_cast<core::StageId>(i)));
+  text +=
+      ",visible_m,closest_obstacle_m,gap_average_m,sensor_volume_m3,map_volume_m3,planner,smoother,missed\n";
   for (const MissionReport& mission : missions) {
     for (const DecisionRecord& d : mission.decisions) {
-      text += fmt::format("{},{},{:.4f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{},{},{:.1f},{:.1f},{:.1f},{:.4f},{},{:.4f},{:.6f}", mission.result.design,
-                          mission.result.seed, d.time_s, d.p_WB.x(), d.p_WB.y(), d.p_WB.z(), d.speed_mps, d.speed_limit_mps, d.p0_m, d.p1_m, d.v0_m3,
-                          d.v1_m3, d.v2_m3, d.time_budget_s, d.budget_source, d.deadline_s, d.latency_s);
+      text += fmt::format(
+          "{},{},{:.4f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{},{},{:.1f},{:.1f},{:.1f},{:.4f},{},{:.4f},{:."
+          "6f}",
+          mission.result.design, mission.result.seed, d.time_s, d.p_WB.x(), d.p_WB.y(), d.p_WB.z(),
+          d.speed_mps, d.speed_limit_mps, d.p0_m, d.p1_m, d.v0_m3, d.v1_m3, d.v2_m3, d.time_budget_s,
+          d.budget_source, d.deadline_s, d.latency_s);
       for (const double stage_s : d.stage_s) text += fmt::format(",{:.6f}", stage_s);
-      text += fmt::format(",{:.2f},{:.2f},{:.2f},{:.0f},{:.0f},{},{},{}\n", d.visible_m, d.closest_obstacle_m, d.gap_average_m, d.sensor_volume_m3,
-                          d.map_volume_m3, d.planner_status, d.smoother_status, d.missed ? 1 : 0);
+      text += fmt::format(",{:.2f},{:.2f},{:.2f},{:.0f},{:.0f},{},{},{}\n", d.visible_m, d.closest_obstacle_m,
+                          d.gap_average_m, d.sensor_volume_m3, d.map_volume_m3, d.planner_status,
+                          d.smoother_status, d.missed ? 1 : 0);
     }
   }
   return write_file(path, text);

@@ -8,8 +8,9 @@
 
 namespace roborun::report {
 
-/// Writes one line a decision of every mission, with units in the column names. Written beside `path` and renamed, so that
-/// a half-written file never stays under that name. Empty if all is well, otherwise one line that says what failed.
+/// Writes one line a decision of every mission, with units in the column names. Written beside `path` and
+/// renamed, so that a half-written file never stays under that name. Empty if all is well, otherwise one line
+/// that says what failed.
 [[nodiscard]] std::string write_trace_csv(const std::string& path, std::span<const MissionReport> missions);
 /// Writes text the same way.
 [[nodiscard]] std::string write_file(const std::string& path, const std::string& text);

@@ -80,13 +80,15 @@ void Estimator::propagate_covariance(double dt_s) noexcept {
   F.block<3, 3>(kVelocity, kAttitude) = -dt_s * skew(force_W_);
   F.block<3, 3>(kVelocity, kAccelBias) = -dt_s * R_WB;
   F.block<3, 3>(kAttitude, kGyroBias) = -dt_s * R_WB;
-  const Covariance FP = F * P_;
-  P_.noalias() = FP * F.transpose();
+  const Covariance FP = F.lazyProduct(P_);
+  P_ = FP.lazyProduct(F.transpose());
 
   const double samples = kCovarianceEvery;
   const double sample_dt_s = dt_s / samples;
-  const double velocity = samples * config_.accel_noise_mps2 * config_.accel_noise_mps2 * sample_dt_s * sample_dt_s;
-  const double attitude = samples * config_.gyro_noise_radps * config_.gyro_noise_radps * sample_dt_s * sample_dt_s;
+  const double velocity =
+      samples * config_.accel_noise_mps2 * config_.accel_noise_mps2 * sample_dt_s * sample_dt_s;
+  const double attitude =
+      samples * config_.gyro_noise_radps * config_.gyro_noise_radps * sample_dt_s * sample_dt_s;
   for (int i = 0; i < 3; ++i) {
     P_(kVelocity + i, kVelocity + i) += velocity;
     P_(kAttitude + i, kAttitude + i) += attitude;
@@ -144,7 +146,8 @@ void Estimator::start(const firmware_if::GnssFix& fix) noexcept {
 Status Estimator::update(const firmware_if::GnssFix& fix) noexcept {
   const Vector3 p_W = to_vector(fix.p_WB_m);
   const Vector3 v_W = to_vector(fix.v_WB_mps);
-  const bool sigmas_ok = fix.sigma_horizontal_m > 0.0 && fix.sigma_vertical_m > 0.0 && fix.sigma_speed_mps > 0.0;
+  const bool sigmas_ok =
+      fix.sigma_horizontal_m > 0.0 && fix.sigma_vertical_m > 0.0 && fix.sigma_speed_mps > 0.0;
   if (!is_finite(p_W) || !is_finite(v_W) || !sigmas_ok || !std::isfinite(fix.sigma_horizontal_m) ||
       !std::isfinite(fix.sigma_vertical_m) || !std::isfinite(fix.sigma_speed_mps)) {
     ++counters_.refused_not_finite;
@@ -194,7 +197,8 @@ Status Estimator::update(const firmware_if::BarometerSample& sample) noexcept {
     return Status::kStale;
   }
   last_barometer_ = sample.stamp;
-  if (!correct(kPosition + 2, sample.altitude_m - then->p_WB.z(), config_.barometer_sigma_m)) return Status::kInvalidArgument;
+  if (!correct(kPosition + 2, sample.altitude_m - then->p_WB.z(), config_.barometer_sigma_m))
+    return Status::kInvalidArgument;
   ++counters_.barometer;
   reset_if_broken();
   return Status::kOk;

@@ -1,5 +1,6 @@
 /// Where the vehicle is: an error-state Kalman filter over IMU, GNSS and barometer.
-/// Source: J. Sola, "Quaternion kinematics for the error-state Kalman filter" (2017), attitude error in the world frame.
+/// Source: J. Sola, "Quaternion kinematics for the error-state Kalman filter" (2017), attitude error in the
+/// world frame.
 #pragma once
 
 #include <array>
@@ -22,25 +23,26 @@ struct EstimatedState {
   double position_sigma_m{};  ///< Largest standard deviation of the three axes.
 };
 
-/// 15 error states: position, velocity, attitude, gyro bias, accelerometer bias. A fix that arrives late is compared with
-/// the state at its own instant and its correction applied to the present: at 100 ms and these rates the error of doing
-/// so is far below the receiver's noise.
+/// 15 error states: position, velocity, attitude, gyro bias, accelerometer bias. A fix that arrives late is
+/// compared with the state at its own instant and its correction applied to the present: at 100 ms and these
+/// rates the error of doing so is far below the receiver's noise.
 class Estimator {
  public:
   struct Config {
-    double gyro_noise_radps{0.0012};      ///< One sigma a sample. (0, 1]
-    double accel_noise_mps2{0.05};        ///< One sigma a sample, vibration included. (0, 10]
-    double gyro_bias_walk_radps{2e-5};    ///< Per sqrt(s). (0, 1]
-    double accel_bias_walk_mps2{2e-4};    ///< Per sqrt(s). (0, 1]
-    double barometer_sigma_m{0.6};        ///< Noise and drift of the sensor. (0, 100]
-    double gate_sigma{6.0};               ///< Innovations beyond this are refused. [3, 20]
-    Nanos imu_lost_after{25'000'000};     ///< Ten samples at 400 Hz.
-    Nanos oldest_fix{450'000'000};        ///< What the ring of past states covers.
+    double gyro_noise_radps{0.0012};    ///< One sigma a sample. (0, 1]
+    double accel_noise_mps2{0.05};      ///< One sigma a sample, vibration included. (0, 10]
+    double gyro_bias_walk_radps{2e-5};  ///< Per sqrt(s). (0, 1]
+    double accel_bias_walk_mps2{2e-4};  ///< Per sqrt(s). (0, 1]
+    double barometer_sigma_m{0.6};      ///< Noise and drift of the sensor. (0, 100]
+    double gate_sigma{6.0};             ///< Innovations beyond this are refused. [3, 20]
+    Nanos imu_lost_after{25'000'000};   ///< Ten samples at 400 Hz.
+    Nanos oldest_fix{450'000'000};      ///< What the ring of past states covers.
     [[nodiscard]] constexpr Status validate() const noexcept {
-      const bool ok = gyro_noise_radps > 0 && gyro_noise_radps <= 1 && accel_noise_mps2 > 0 && accel_noise_mps2 <= 10 &&
-                      gyro_bias_walk_radps > 0 && gyro_bias_walk_radps <= 1 && accel_bias_walk_mps2 > 0 &&
-                      accel_bias_walk_mps2 <= 1 && barometer_sigma_m > 0 && barometer_sigma_m <= 100 &&
-                      gate_sigma >= 3 && gate_sigma <= 20 && imu_lost_after > Nanos{0} && oldest_fix > Nanos{0};
+      const bool ok = gyro_noise_radps > 0 && gyro_noise_radps <= 1 && accel_noise_mps2 > 0 &&
+                      accel_noise_mps2 <= 10 && gyro_bias_walk_radps > 0 && gyro_bias_walk_radps <= 1 &&
+                      accel_bias_walk_mps2 > 0 && accel_bias_walk_mps2 <= 1 && barometer_sigma_m > 0 &&
+                      barometer_sigma_m <= 100 && gate_sigma >= 3 && gate_sigma <= 20 &&
+                      imu_lost_after > Nanos{0} && oldest_fix > Nanos{0};
       return ok ? Status::kOk : Status::kInvalidArgument;
     }
   };
@@ -53,10 +55,11 @@ class Estimator {
 
   explicit Estimator(const Config& config) noexcept : config_(config) {}
 
-  /// One IMU sample, in order. Refused (kInvalidArgument, kStale) if not finite or not newer than the one before.
-  /// RT-safe: O(1), about 2 us, every fourth call 5 us more for the covariance.
+  /// One IMU sample, in order. Refused (kInvalidArgument, kStale) if not finite or not newer than the one
+  /// before. RT-safe: O(1), about 2 us, every fourth call 5 us more for the covariance.
   [[nodiscard]] Status predict(const firmware_if::ImuSample& sample) noexcept;
-  /// A fix, possibly late. The first one, once IMU samples flow, starts the filter (at rest, level). kNotReady before.
+  /// A fix, possibly late. The first one, once IMU samples flow, starts the filter (at rest, level).
+  /// kNotReady before.
   [[nodiscard]] Status update(const firmware_if::GnssFix& fix) noexcept;
   [[nodiscard]] Status update(const firmware_if::BarometerSample& sample) noexcept;
 
@@ -65,7 +68,9 @@ class Estimator {
   /// The pose at a past instant within the last 0.5 s, nearest sample (1.25 ms). kStale outside.
   [[nodiscard]] Status pose_at(MonotonicTime stamp, Pose& X_WB) const noexcept;
   /// True if no IMU sample came for config.imu_lost_after.
-  [[nodiscard]] bool imu_lost(MonotonicTime now) const noexcept { return now - state_.stamp > config_.imu_lost_after; }
+  [[nodiscard]] bool imu_lost(MonotonicTime now) const noexcept {
+    return now - state_.stamp > config_.imu_lost_after;
+  }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 
  private:

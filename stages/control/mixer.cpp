@@ -12,7 +12,8 @@ constexpr std::array<std::array<double, 3>, 4> kSign{{{1, -1, 1}, {-1, -1, -1}, 
 
 }  // namespace
 
-firmware_if::MotorCommand mix(const Airframe& airframe, double thrust_N, const Vector3& torque_B_Nm) noexcept {
+firmware_if::MotorCommand mix(const Airframe& airframe, double thrust_N,
+                              const Vector3& torque_B_Nm) noexcept {
   firmware_if::MotorCommand command;
   if (!std::isfinite(thrust_N) || !is_finite(torque_B_Nm)) return command;
 

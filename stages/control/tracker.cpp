@@ -18,10 +18,12 @@ Vector3 clamp_norm(const Vector3& v, double limit) noexcept {
 }  // namespace
 
 Vector3 Tracker::acceleration_W(const Input& in) noexcept {
-  const Vector3 correction = clamp_norm(config_.position_gain_Hz * (in.reference.p_W - in.state.p_WB), config_.correction_limit_mps);
+  const Vector3 correction =
+      clamp_norm(config_.position_gain_Hz * (in.reference.p_W - in.state.p_WB), config_.correction_limit_mps);
   const Vector3 error_W_mps = in.reference.v_W + correction - in.state.v_WB;
-  integral_W_mps2_ = clamp_norm(integral_W_mps2_ + config_.velocity_integral_Hz2 * config_.period_s * error_W_mps,
-                                config_.integral_limit_mps2);
+  integral_W_mps2_ =
+      clamp_norm(integral_W_mps2_ + config_.velocity_integral_Hz2 * config_.period_s * error_W_mps,
+                 config_.integral_limit_mps2);
   Vector3 a_W = in.reference.a_W + config_.velocity_gain_Hz * error_W_mps + integral_W_mps2_;
   // Never ask for less than half of hover thrust: attitude needs something to work with.
   a_W.z() = std::clamp(a_W.z(), -0.5 * kGravity_mps2, 0.6 * kGravity_mps2);
@@ -38,8 +40,9 @@ Vector3 Tracker::acceleration_W(const Input& in) noexcept {
 
 Status Tracker::step(const Input& in, firmware_if::MotorCommand& out) noexcept {
   const bool finite = is_finite(in.state.p_WB) && is_finite(in.state.v_WB) && is_finite(in.state.w_WB_B) &&
-                      in.state.q_WB.coeffs().allFinite() && is_finite(in.reference.p_W) && is_finite(in.reference.v_W) &&
-                      is_finite(in.reference.a_W) && is_finite(in.reference.j_W) && std::isfinite(in.yaw_rad);
+                      in.state.q_WB.coeffs().allFinite() && is_finite(in.reference.p_W) &&
+                      is_finite(in.reference.v_W) && is_finite(in.reference.a_W) &&
+                      is_finite(in.reference.j_W) && std::isfinite(in.yaw_rad);
   if (!finite) {
     ++counters_.refused;
     return Status::kInvalidArgument;
@@ -58,15 +61,17 @@ Status Tracker::step(const Input& in, firmware_if::MotorCommand& out) noexcept {
   R_WD.col(2) = z_W;
 
   const Matrix3 error = R_WD.transpose() * R_WB;
-  const Vector3 error_B(0.5 * (error(2, 1) - error(1, 2)), 0.5 * (error(0, 2) - error(2, 0)), 0.5 * (error(1, 0) - error(0, 1)));
+  const Vector3 error_B(0.5 * (error(2, 1) - error(1, 2)), 0.5 * (error(0, 2) - error(2, 0)),
+                        0.5 * (error(1, 0) - error(0, 1)));
   // The jerk of the trajectory turns the thrust vector at a known rate.
   const Vector3 turn_W = (in.reference.j_W - z_W * z_W.dot(in.reference.j_W)) / force_W.norm();
   const Vector3 feed_B(-turn_W.dot(R_WB.col(1)), turn_W.dot(R_WB.col(0)), 0.0);
   const Vector3 rate_B = feed_B - config_.attitude_gain_Hz * error_B.cwiseProduct(Vector3(1.0, 1.0, 0.4));
 
   const Vector3 momentum = airframe.inertia_kgm2.cwiseProduct(in.state.w_WB_B);
-  const Vector3 torque_B = config_.rate_gain_Hz * airframe.inertia_kgm2.cwiseProduct(rate_B - in.state.w_WB_B) +
-                           in.state.w_WB_B.cross(momentum);
+  const Vector3 torque_B =
+      config_.rate_gain_Hz * airframe.inertia_kgm2.cwiseProduct(rate_B - in.state.w_WB_B) +
+      in.state.w_WB_B.cross(momentum);
   const double thrust_N = airframe.mass_kg * std::max(force_W.dot(R_WB.col(2)), 0.0);
   out = mix(airframe, thrust_N, torque_B);
   return Status::kOk;

@@ -12,27 +12,30 @@
 
 namespace roborun::stages {
 
-/// Attitude errors are geometric (Lee, Leok, McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", 2010).
+/// Attitude errors are geometric (Lee, Leok, McClamroch, "Geometric tracking control of a quadrotor UAV on
+/// SE(3)", 2010).
 class Tracker {
  public:
   struct Config {
     Airframe airframe{};
-    double position_gain_Hz{1.4};          ///< 1/s. (0, 10]
-    double velocity_gain_Hz{2.8};          ///< 1/s. (0, 20]
-    double velocity_integral_Hz2{0.9};     ///< 1/s2: takes up wind and drag. [0, 20]
-    double integral_limit_mps2{2.5};       ///< Anti-windup: more than the drag at 8 m/s. (0, 10]
-    double attitude_gain_Hz{7.0};          ///< 1/s. (0, 50]
-    double rate_gain_Hz{14.0};             ///< 1/s; motor lag of 40 ms leaves a damping of 0.67. (0, 100]
-    double tilt_limit_rad{0.60};           ///< 34 degrees: 6.7 m/s2 sideways. (0, 1.2]
-    double correction_limit_mps{3.0};      ///< Of the position loop. (0, 20]
-    double period_s{0.0025};               ///< The minor frame. (0, 0.1]
+    double position_gain_Hz{1.4};       ///< 1/s. (0, 10]
+    double velocity_gain_Hz{2.8};       ///< 1/s. (0, 20]
+    double velocity_integral_Hz2{0.9};  ///< 1/s2: takes up wind and drag. [0, 20]
+    double integral_limit_mps2{2.5};    ///< Anti-windup: more than the drag at 8 m/s. (0, 10]
+    double attitude_gain_Hz{7.0};       ///< 1/s. (0, 50]
+    double rate_gain_Hz{14.0};          ///< 1/s; motor lag of 40 ms leaves a damping of 0.67. (0, 100]
+    double tilt_limit_rad{0.60};        ///< 34 degrees: 6.7 m/s2 sideways. (0, 1.2]
+    double correction_limit_mps{3.0};   ///< Of the position loop. (0, 20]
+    double period_s{0.0025};            ///< The minor frame. (0, 0.1]
     [[nodiscard]] constexpr Status validate() const noexcept {
-      const bool ok = airframe.mass_kg > 0 && airframe.arm_m > 0 && airframe.max_thrust_N > 0 && airframe.yaw_torque_m > 0 &&
-                      position_gain_Hz > 0 && position_gain_Hz <= 10 && velocity_gain_Hz > 0 && velocity_gain_Hz <= 20 &&
-                      velocity_integral_Hz2 >= 0 && velocity_integral_Hz2 <= 20 && integral_limit_mps2 > 0 &&
-                      integral_limit_mps2 <= 10 && attitude_gain_Hz > 0 && attitude_gain_Hz <= 50 && rate_gain_Hz > 0 &&
-                      rate_gain_Hz <= 100 && tilt_limit_rad > 0 && tilt_limit_rad <= 1.2 && correction_limit_mps > 0 &&
-                      correction_limit_mps <= 20 && period_s > 0 && period_s <= 0.1;
+      const bool ok = airframe.mass_kg > 0 && airframe.arm_m > 0 && airframe.max_thrust_N > 0 &&
+                      airframe.yaw_torque_m > 0 && position_gain_Hz > 0 && position_gain_Hz <= 10 &&
+                      velocity_gain_Hz > 0 && velocity_gain_Hz <= 20 && velocity_integral_Hz2 >= 0 &&
+                      velocity_integral_Hz2 <= 20 && integral_limit_mps2 > 0 && integral_limit_mps2 <= 10 &&
+                      attitude_gain_Hz > 0 && attitude_gain_Hz <= 50 && rate_gain_Hz > 0 &&
+                      rate_gain_Hz <= 100 && tilt_limit_rad > 0 && tilt_limit_rad <= 1.2 &&
+                      correction_limit_mps > 0 && correction_limit_mps <= 20 && period_s > 0 &&
+                      period_s <= 0.1;
       return ok ? Status::kOk : Status::kInvalidArgument;
     }
   };
@@ -48,8 +51,8 @@ class Tracker {
 
   explicit Tracker(const Config& config) noexcept : config_(config) {}
 
-  /// RT-safe: O(1). A non-finite input is refused with kInvalidArgument, counted, and `out` stays as it was: the caller
-  /// repeats the command before, which for one frame is the safest known.
+  /// RT-safe: O(1). A non-finite input is refused with kInvalidArgument, counted, and `out` stays as it was:
+  /// the caller repeats the command before, which for one frame is the safest known.
   [[nodiscard]] Status step(const Input& in, firmware_if::MotorCommand& out) noexcept;
   /// Forgets the integral: on the ground, and when disarmed.
   void reset() noexcept { integral_W_mps2_.setZero(); }

@@ -20,8 +20,9 @@ void Brick::refresh() noexcept {
     std::uint8_t flags = 0;
     for (std::size_t k = 0; k < 8; ++k) {
       const std::int8_t value = cell[8 * i + k];
-      flags = static_cast<std::uint8_t>(flags | (value == evidence::kUnknown ? content::kUnknown
-                                                                             : (value > 0 ? content::kOccupied : content::kFree)));
+      flags = static_cast<std::uint8_t>(flags | (value == evidence::kUnknown
+                                                     ? content::kUnknown
+                                                     : (value > 0 ? content::kOccupied : content::kFree)));
       known += value != evidence::kUnknown ? 1U : 0U;
     }
     mip[i] = flags;
@@ -50,7 +51,8 @@ std::uint8_t Brick::flags(int level, std::uint32_t morton) const noexcept {
 
 void Brick::add_free(int level, std::uint32_t morton) noexcept {
   const std::size_t count = std::size_t{1} << (3U * static_cast<unsigned>(level));
-  for (std::int8_t& value : std::span(cell).subspan(morton * count, count)) value = evidence::after_miss(value);
+  for (std::int8_t& value : std::span(cell).subspan(morton * count, count))
+    value = evidence::after_miss(value);
   dirty = true;
 }
 

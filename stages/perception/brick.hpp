@@ -1,4 +1,5 @@
-/// A brick: 16^3 cells of 0.3 m in Morton order, and one mip level for each coarser precision up to its own 4.8 m.
+/// A brick: 16^3 cells of 0.3 m in Morton order, and one mip level for each coarser precision up to its
+/// own 4.8 m.
 #pragma once
 
 #include <array>
@@ -9,13 +10,14 @@
 
 namespace roborun::stages {
 
-inline constexpr int kBrickLevel = 4;                        ///< A brick is one cell of this level.
-inline constexpr int kBrickCells = 1 << kBrickLevel;         ///< Per edge.
+inline constexpr int kBrickLevel = 4;                 ///< A brick is one cell of this level.
+inline constexpr int kBrickCells = 1 << kBrickLevel;  ///< Per edge.
 inline constexpr std::size_t kCellsPerBrick = 4096;
 inline constexpr double kBrick_m = cell_size_m(kBrickLevel);
 
-/// What a cell holds: kUnknown, or evidence: negative is free, positive occupied. One look through free space makes it
-/// free; one surface makes it occupied whatever was there; kMost / kMiss = 10 looks through it clear the oldest obstacle.
+/// What a cell holds: kUnknown, or evidence: negative is free, positive occupied. One look through free space
+/// makes it free; one surface makes it occupied whatever was there; kMost / kMiss = 10 looks through it clear
+/// the oldest obstacle.
 namespace evidence {
 inline constexpr std::int8_t kUnknown = -128;
 inline constexpr std::int8_t kFree = -1;
@@ -40,11 +42,11 @@ inline constexpr std::uint8_t kFree = 4;  ///< An entry that equals kFree is fre
 }  // namespace content
 
 struct Brick {
-  std::array<std::int8_t, kCellsPerBrick> cell{};          ///< Level 0, Morton order: the truth.
-  std::array<std::uint8_t, 512 + 64 + 8 + 1> mip{};        ///< Levels 1 to 4, derived by refresh().
-  std::int32_t x{}, y{}, z{};                              ///< Position in bricks from the map's corner.
-  std::uint16_t known_count{};                             ///< Cells that are not unknown.
-  bool dirty{};                                            ///< Cells changed since refresh().
+  std::array<std::int8_t, kCellsPerBrick> cell{};    ///< Level 0, Morton order: the truth.
+  std::array<std::uint8_t, 512 + 64 + 8 + 1> mip{};  ///< Levels 1 to 4, derived by refresh().
+  std::int32_t x{}, y{}, z{};                        ///< Position in bricks from the map's corner.
+  std::uint16_t known_count{};                       ///< Cells that are not unknown.
+  bool dirty{};                                      ///< Cells changed since refresh().
 
   void clear(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
   /// Derives mip and known_count from cell. O(4096).

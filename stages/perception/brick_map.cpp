@@ -27,19 +27,23 @@ std::size_t position_count(const Aabb& bounds_W) noexcept {
          static_cast<std::size_t>(even_bricks(size.z()));
 }
 
-std::size_t pyramid_bytes(std::size_t side) noexcept { return sizeof(DepthPyramid::Bound) * (side * side * 2 + 64); }
+std::size_t pyramid_bytes(std::size_t side) noexcept {
+  return sizeof(DepthPyramid::Bound) * (side * side * 2 + 64);
+}
 
 }  // namespace
 
 Status BrickMap::Config::validate() const noexcept {
   const Vector3 size = bounds_W.size();
-  const bool bounds_ok = is_finite(bounds_W.min_W) && is_finite(bounds_W.max_W) && size.minCoeff() > 0.0 && size.maxCoeff() <= 40e3;
+  const bool bounds_ok = is_finite(bounds_W.min_W) && is_finite(bounds_W.max_W) && size.minCoeff() > 0.0 &&
+                         size.maxCoeff() <= 40e3;
   if (!bounds_ok) return Status::kInvalidArgument;
-  const double positions = 8.0 * std::ceil(size.x() / kCoarsest_m + 1) * std::ceil(size.y() / kCoarsest_m + 1) *
-                           std::ceil(size.z() / kCoarsest_m + 1);
-  const bool ok = positions <= kMaxPositions && max_bricks >= 64 && max_bricks <= 200000 && max_frames >= 1 && max_frames <= 8 &&
-                  max_image_side >= 8 && max_image_side <= DepthPyramid::kMaxPixels && vehicle_radius_m >= 0.0 &&
-                  vehicle_radius_m <= 2.0 && depth_margin_m >= 0.0 && depth_margin_per_m >= 0.0;
+  const double positions = 8.0 * std::ceil(size.x() / kCoarsest_m + 1) *
+                           std::ceil(size.y() / kCoarsest_m + 1) * std::ceil(size.z() / kCoarsest_m + 1);
+  const bool ok = positions <= kMaxPositions && max_bricks >= 64 && max_bricks <= 200000 && max_frames >= 1 &&
+                  max_frames <= 8 && max_image_side >= 8 && max_image_side <= DepthPyramid::kMaxPixels &&
+                  vehicle_radius_m >= 0.0 && vehicle_radius_m <= 2.0 && depth_margin_m >= 0.0 &&
+                  depth_margin_per_m >= 0.0;
   return ok ? Status::kOk : Status::kInvalidArgument;
 }
 
@@ -109,8 +113,8 @@ Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexce
 }
 
 bool BrickMap::give_up_farthest() noexcept {
-  // The farthest 1/16 at once, so that the walk over all bricks is paid rarely. Only bricks beyond the reach of the
-  // cameras of this scan may go: they are not dirty.
+  // The farthest 1/16 at once, so that the walk over all bricks is paid rarely. Only bricks beyond the reach
+  // of the cameras of this scan may go: they are not dirty.
   constexpr std::size_t kBuckets = 512;
   constexpr double kBucket_m = 8.0;
   std::array<std::uint32_t, kBuckets> histogram{};

@@ -1,10 +1,10 @@
 /// The occupancy map of the project: bricks on the precision lattice, in fixed memory.
 ///
-/// Free space is found projectively, coarse to fine: a block all of whose pixels see past it is free at once, a block
-/// behind the surface is left alone, the rest is divided until cells of p0. Surfaces are the pixels' end points, always
-/// written at the finest level: that costs no more, and what a coarse block around them hides stays unknown, hence not
-/// free, until a finer look clears it. Free evidence is written first, surfaces after it, so that a look past a cell never
-/// erases a surface seen in the same scan.
+/// Free space is found projectively, coarse to fine: a block all of whose pixels see past it is free at once,
+/// a block behind the surface is left alone, the rest is divided until cells of p0. Surfaces are the pixels'
+/// end points, always written at the finest level: that costs no more, and what a coarse block around them
+/// hides stays unknown, hence not free, until a finer look clears it. Free evidence is written first,
+/// surfaces after it, so that a look past a cell never erases a surface seen in the same scan.
 #pragma once
 
 #include <array>
@@ -23,13 +23,16 @@ namespace roborun::stages {
 class BrickMap final : public OccupancyMap, private MapView {
  public:
   struct Config {
-    Aabb bounds_W{Vector3(-100.0, -100.0, -5.0), Vector3(100.0, 100.0, 20.0)};  ///< Space outside is never stored: unknown.
-    std::size_t max_bricks{9100};        ///< 1,000,000 m3 at 0.3 m. [64, 200000]
-    std::size_t max_frames{6};           ///< Cameras. Space between two images counts as seen only if all arrived. [1, 8]
-    std::size_t max_image_side{512};     ///< Pixels. [8, 512]
-    double vehicle_radius_m{0.6};        ///< Where the vehicle is, nothing else is: free. [0, 2]
-    double depth_margin_m{0.05};         ///< A cell is free only if every pixel sees this much past it ...
-    double depth_margin_per_m{0.0012};   ///< ... plus this times depth squared: three sigma of a stereo camera.
+    Aabb bounds_W{Vector3(-100.0, -100.0, -5.0),
+                  Vector3(100.0, 100.0, 20.0)};  ///< Space outside is never stored: unknown.
+    std::size_t max_bricks{9100};                ///< 1,000,000 m3 at 0.3 m. [64, 200000]
+    std::size_t max_frames{
+        6};  ///< Cameras. Space between two images counts as seen only if all arrived. [1, 8]
+    std::size_t max_image_side{512};  ///< Pixels. [8, 512]
+    double vehicle_radius_m{0.6};     ///< Where the vehicle is, nothing else is: free. [0, 2]
+    double depth_margin_m{0.05};      ///< A cell is free only if every pixel sees this much past it ...
+    double depth_margin_per_m{
+        0.0012};  ///< ... plus this times depth squared: three sigma of a stereo camera.
     /// kInvalidArgument if a number is out of range, or the bounds hold more than 4 million bricks.
     [[nodiscard]] Status validate() const noexcept;
   };
@@ -40,12 +43,14 @@ class BrickMap final : public OccupancyMap, private MapView {
 
   /// Bytes that the constructor takes from the arena.
   [[nodiscard]] static std::size_t arena_bytes(const Config& config) noexcept;
-  /// Precondition: config.validate() is kOk and the arena has arena_bytes(). Check arena.exhausted() afterwards.
+  /// Precondition: config.validate() is kOk and the arena has arena_bytes(). Check arena.exhausted()
+  /// afterwards.
   BrickMap(const Config& config, core::Arena& arena) noexcept;
 
   [[nodiscard]] Status integrate(const IntegrationRequest& request, core::StageBudget& budget,
                                  IntegrationResult& result) noexcept override;
-  [[nodiscard]] Status export_view(const ExportRequest& request, core::StageBudget& budget, core::Work& work) noexcept override;
+  [[nodiscard]] Status export_view(const ExportRequest& request, core::StageBudget& budget,
+                                   core::Work& work) noexcept override;
   [[nodiscard]] const MapView& view() const noexcept override { return *this; }
   [[nodiscard]] double known_volume_m3() const noexcept override;
   [[nodiscard]] std::size_t bytes() const noexcept override;
@@ -77,11 +82,14 @@ class BrickMap final : public OccupancyMap, private MapView {
   [[nodiscard]] CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept override;
   [[nodiscard]] double cell_m() const noexcept override { return cell_size_m(view_level_); }
 
-  [[nodiscard]] std::size_t usable_frames(const IntegrationRequest& request, IntegrationResult& result) noexcept;
+  [[nodiscard]] std::size_t usable_frames(const IntegrationRequest& request,
+                                          IntegrationResult& result) noexcept;
   [[nodiscard]] std::size_t order_bricks(const IntegrationRequest& request) noexcept;
-  [[nodiscard]] bool clear_brick(std::uint32_t slot, const IntegrationRequest& request, core::StageBudget& budget, core::Work& work) noexcept;
+  [[nodiscard]] bool clear_brick(std::uint32_t slot, const IntegrationRequest& request,
+                                 core::StageBudget& budget, core::Work& work) noexcept;
   [[nodiscard]] Sight sight(const Vector3& center_W, double half_m) const noexcept;
-  [[nodiscard]] Sight sight(std::size_t camera, const Vector3& center_W, double half_m, bool& inside) const noexcept;
+  [[nodiscard]] Sight sight(std::size_t camera, const Vector3& center_W, double half_m,
+                            bool& inside) const noexcept;
   void add_surfaces(const IntegrationRequest& request, double reach_m, core::Work& work) noexcept;
   void free_vehicle() noexcept;
   [[nodiscard]] bool cell_of(const Vector3& p_W, Cell& cell) const noexcept;
@@ -89,30 +97,31 @@ class BrickMap final : public OccupancyMap, private MapView {
   [[nodiscard]] const Brick* visible_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
   [[nodiscard]] Brick* touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
   [[nodiscard]] bool give_up_farthest() noexcept;
-  [[nodiscard]] bool brick_range_free(const Brick& brick, const Cell& low, const Cell& high, std::uint64_t& lookups) const noexcept;
+  [[nodiscard]] bool brick_range_free(const Brick& brick, const Cell& low, const Cell& high,
+                                      std::uint64_t& lookups) const noexcept;
   [[nodiscard]] Vector3 brick_center_W(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
   void refresh_dirty() noexcept;
 
   Config config_;
-  Vector3 corner_W_;                    ///< Of the map, a multiple of the coarsest cell.
-  std::int32_t nx_, ny_, nz_;           ///< Bricks, even numbers.
-  std::span<std::int32_t> slot_;        ///< Brick of each position, or -1.
+  Vector3 corner_W_;              ///< Of the map, a multiple of the coarsest cell.
+  std::int32_t nx_, ny_, nz_;     ///< Bricks, even numbers.
+  std::span<std::int32_t> slot_;  ///< Brick of each position, or -1.
   std::span<Brick> brick_;
   std::span<std::uint32_t> free_list_;
   std::span<std::uint32_t> dirty_;
-  std::span<std::uint32_t> order_;      ///< Positions near the cameras, nearest to the trajectory first.
+  std::span<std::uint32_t> order_;  ///< Positions near the cameras, nearest to the trajectory first.
   std::span<std::uint16_t> order_key_;
   std::size_t free_count_{0};
   std::size_t dirty_count_{0};
   std::array<Camera, 8> camera_{};
   std::array<std::size_t, 8> frame_of_{};
   std::size_t camera_count_{0};
-  bool complete_{false};                ///< Every camera of the vehicle contributed to this scan.
+  bool complete_{false};  ///< Every camera of the vehicle contributed to this scan.
   std::array<std::optional<DepthPyramid>, 8> pyramid_{};
   std::uint64_t known_cells_{0};
   Vector3 vehicle_W_ = Vector3::Zero();
   int view_level_{0};
-  double view_radius_m_{0.0};           ///< Bricks whose centre is farther from view_center_W_ are unknown.
+  double view_radius_m_{0.0};  ///< Bricks whose centre is farther from view_center_W_ are unknown.
   Vector3 view_center_W_ = Vector3::Zero();
   Counters counters_{};
 };

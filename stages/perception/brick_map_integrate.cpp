@@ -6,9 +6,9 @@
 namespace roborun::stages {
 namespace {
 
-constexpr double kNear_m = 1e-3;          // a box that reaches behind the camera is projected from here on
+constexpr double kNear_m = 1e-3;  // a box that reaches behind the camera is projected from here on
 constexpr std::uint64_t kPollEvery = 512;
-constexpr double kOrderStep_m = 0.5;      // bricks whose distances differ by less keep their order in space
+constexpr double kOrderStep_m = 0.5;  // bricks whose distances differ by less keep their order in space
 
 double node_volume_m3(int level) noexcept {
   const double edge_m = cell_size_m(level);
@@ -45,11 +45,13 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
 }
 
 std::size_t BrickMap::order_bricks(const IntegrationRequest& request) noexcept {
-  // Everything that a camera can see, as a box around all of them; a cubic frustum of range r reaches sqrt(3) r.
+  // Everything that a camera can see, as a box around all of them; a cubic frustum of range r reaches sqrt(3)
+  // r.
   Vector3 low = camera_[0].p_WC;
   Vector3 high = low;
   for (std::size_t i = 0; i < camera_count_; ++i) {
-    const double reach_m = static_cast<double>(camera_[i].range_m) * std::sqrt(1.0 + 2.0 * camera_[i].tan_half * camera_[i].tan_half);
+    const double reach_m = static_cast<double>(camera_[i].range_m) *
+                           std::sqrt(1.0 + 2.0 * camera_[i].tan_half * camera_[i].tan_half);
     low = low.cwiseMin(camera_[i].p_WC - Vector3::Constant(reach_m));
     high = high.cwiseMax(camera_[i].p_WC + Vector3::Constant(reach_m));
   }
@@ -68,8 +70,10 @@ std::size_t BrickMap::order_bricks(const IntegrationRequest& request) noexcept {
   std::array<std::uint32_t, kBuckets> start{};
   const auto key_of = [&request](const Vector3& center_W) {
     double nearest2 = 1e18;
-    for (const Vector3& p_W : request.trajectory_W) nearest2 = std::min(nearest2, (p_W - center_W).squaredNorm());
-    return static_cast<std::uint16_t>(std::min(std::sqrt(nearest2) / kOrderStep_m, static_cast<double>(kBuckets - 1)));
+    for (const Vector3& p_W : request.trajectory_W)
+      nearest2 = std::min(nearest2, (p_W - center_W).squaredNorm());
+    return static_cast<std::uint16_t>(
+        std::min(std::sqrt(nearest2) / kOrderStep_m, static_cast<double>(kBuckets - 1)));
   };
   for (std::int32_t z = z0; z <= z1; ++z) {
     for (std::int32_t y = y0; y <= y1; ++y) {
@@ -97,7 +101,8 @@ std::size_t BrickMap::order_bricks(const IntegrationRequest& request) noexcept {
   return total;
 }
 
-BrickMap::Sight BrickMap::sight(std::size_t camera, const Vector3& center_W, double half_m, bool& inside) const noexcept {
+BrickMap::Sight BrickMap::sight(std::size_t camera, const Vector3& center_W, double half_m,
+                                bool& inside) const noexcept {
   const Camera& c = camera_[camera];
   const Vector3 p_C = c.R_CW * (center_W - c.p_WC);
   const Vector3 e_C = half_m * c.abs_R_CW.rowwise().sum();
@@ -114,7 +119,8 @@ BrickMap::Sight BrickMap::sight(std::size_t camera, const Vector3& center_W, dou
   const double right = y_low * (y_low > 0.0 ? inverse_far : inverse_near);
   const double up = z_high * (z_high > 0.0 ? inverse_near : inverse_far);
   const double down = z_low * (z_low > 0.0 ? inverse_far : inverse_near);
-  if (right >= c.tan_half || left <= -c.tan_half || down >= c.tan_half || up <= -c.tan_half) return Sight::kHidden;
+  if (right >= c.tan_half || left <= -c.tan_half || down >= c.tan_half || up <= -c.tan_half)
+    return Sight::kHidden;
   inside = left <= c.tan_half && right >= -c.tan_half && up <= c.tan_half && down >= -c.tan_half;
   const auto pixel = [](double tangents, double scale, int count) {
     return std::clamp(static_cast<int>(tangents * scale), 0, count - 1);
@@ -152,8 +158,8 @@ BrickMap::Sight BrickMap::sight(const Vector3& center_W, double half_m) const no
   return !any_hidden && covered ? Sight::kFree : Sight::kMixed;
 }
 
-bool BrickMap::clear_brick(std::uint32_t position, const IntegrationRequest& request, core::StageBudget& budget,
-                           core::Work& work) noexcept {
+bool BrickMap::clear_brick(std::uint32_t position, const IntegrationRequest& request,
+                           core::StageBudget& budget, core::Work& work) noexcept {
   const auto nx = static_cast<std::uint32_t>(nx_);
   const auto ny = static_cast<std::uint32_t>(ny_);
   const auto bx = static_cast<std::int32_t>(position % nx);
@@ -176,15 +182,17 @@ bool BrickMap::clear_brick(std::uint32_t position, const IntegrationRequest& req
       work.volume_m3 += node_volume_m3(node.level);
       const std::uint32_t morton = morton3(node.x, node.y, node.z);
       const std::int32_t slot = slot_[position];
-      const bool nothing_new = slot >= 0 && !brick_[static_cast<std::size_t>(slot)].dirty &&
-                               brick_[static_cast<std::size_t>(slot)].flags(node.level, morton) == content::kFree;
+      const bool nothing_new =
+          slot >= 0 && !brick_[static_cast<std::size_t>(slot)].dirty &&
+          brick_[static_cast<std::size_t>(slot)].flags(node.level, morton) == content::kFree;
       if (nothing_new) continue;
       if (brick == nullptr) brick = touch(bx, by, bz);
       if (brick == nullptr) return true;  // pool full, and nothing farther away to give up
       brick->add_free(node.level, morton);
     } else if (seen == Sight::kMixed && node.level > finest) {
       for (std::uint32_t child = 0; child < 8; ++child) {
-        stack[depth++] = {node.level - 1, 2 * node.x + (child & 1U), 2 * node.y + ((child >> 1U) & 1U), 2 * node.z + (child >> 2U)};
+        stack[depth++] = {node.level - 1, 2 * node.x + (child & 1U), 2 * node.y + ((child >> 1U) & 1U),
+                          2 * node.z + (child >> 2U)};
       }
     }
   }
@@ -199,7 +207,8 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, double reach_m, c
     for (int v = 0; v < frame.height; ++v) {
       const double z = t - (v + 0.5) * 2.0 * t / frame.height;
       for (int u = 0; u < frame.width; ++u) {
-        const float depth_m = frame.depth_m[static_cast<std::size_t>(v) * frame.width + static_cast<std::size_t>(u)];
+        const float depth_m =
+            frame.depth_m[static_cast<std::size_t>(v) * frame.width + static_cast<std::size_t>(u)];
         if (!(depth_m > 0.0F) || depth_m >= frame.range_m) continue;
         const double y = t - (u + 0.5) * 2.0 * t / frame.width;
         const Vector3 p_W = posed.X_WC * (static_cast<double>(depth_m) * Vector3(1.0, y, z));
@@ -236,7 +245,8 @@ void BrickMap::free_vehicle() noexcept {
   }
 }
 
-Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget& budget, IntegrationResult& result) noexcept {
+Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget& budget,
+                           IntegrationResult& result) noexcept {
   result = {};
   result.work.level = std::clamp(request.level, 0, kPrecisionLevels - 1);
   if (usable_frames(request, result) == 0 || request.trajectory_W.empty()) return Status::kInvalidArgument;

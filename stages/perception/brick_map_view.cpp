@@ -5,7 +5,8 @@
 
 namespace roborun::stages {
 
-Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& budget, core::Work& work) noexcept {
+Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& budget,
+                             core::Work& work) noexcept {
   work = {};
   work.level = std::clamp(request.level, 0, kPrecisionLevels - 1);
   if (!is_finite(request.center_W) || !(request.volume_m3 >= 0.0)) return Status::kInvalidArgument;
@@ -49,7 +50,8 @@ const Brick* BrickMap::visible_brick(std::int32_t bx, std::int32_t by, std::int3
   return distance2 < view_radius_m_ * view_radius_m_ ? &brick_[static_cast<std::size_t>(slot)] : nullptr;
 }
 
-bool BrickMap::brick_range_free(const Brick& brick, const Cell& low, const Cell& high, std::uint64_t& lookups) const noexcept {
+bool BrickMap::brick_range_free(const Brick& brick, const Cell& low, const Cell& high,
+                                std::uint64_t& lookups) const noexcept {
   std::array<Node, 7 * kBrickLevel + 1> stack{};
   std::size_t depth = 0;
   stack[depth++] = {kBrickLevel, 0, 0, 0};
@@ -61,12 +63,14 @@ bool BrickMap::brick_range_free(const Brick& brick, const Cell& low, const Cell&
     if (node.level <= view_level_) return false;
     const auto level = static_cast<unsigned>(node.level - 1);
     for (std::uint32_t child = 0; child < 8; ++child) {
-      const Node next{node.level - 1, 2 * node.x + (child & 1U), 2 * node.y + ((child >> 1U) & 1U), 2 * node.z + (child >> 2U)};
+      const Node next{node.level - 1, 2 * node.x + (child & 1U), 2 * node.y + ((child >> 1U) & 1U),
+                      2 * node.z + (child >> 2U)};
       const auto outside = [level](std::uint32_t index, std::int32_t from, std::int32_t to) {
         const auto first = static_cast<std::int32_t>(index << level);
         return first > to || first + (1 << level) - 1 < from;
       };
-      if (outside(next.x, low.x, high.x) || outside(next.y, low.y, high.y) || outside(next.z, low.z, high.z)) continue;
+      if (outside(next.x, low.x, high.x) || outside(next.y, low.y, high.y) || outside(next.z, low.z, high.z))
+        continue;
       stack[depth++] = next;
     }
   }
@@ -113,8 +117,10 @@ CellState BrickMap::at(const Vector3& p_W, std::uint64_t& lookups) const noexcep
     flags = brick->flags(view_level_, morton3(inside(cell.x), inside(cell.y), inside(cell.z)));
   } else {
     for (std::int32_t child = 0; child < 8; ++child) {
-      const Brick* brick = visible_brick((bx & ~1) + (child & 1), (by & ~1) + ((child >> 1) & 1), (bz & ~1) + (child >> 2));
-      flags = static_cast<std::uint8_t>(flags | (brick == nullptr ? content::kUnknown : brick->flags(kBrickLevel, 0)));
+      const Brick* brick =
+          visible_brick((bx & ~1) + (child & 1), (by & ~1) + ((child >> 1) & 1), (bz & ~1) + (child >> 2));
+      flags = static_cast<std::uint8_t>(
+          flags | (brick == nullptr ? content::kUnknown : brick->flags(kBrickLevel, 0)));
     }
   }
   if ((flags & content::kOccupied) != 0) return CellState::kOccupied;

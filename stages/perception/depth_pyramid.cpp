@@ -10,9 +10,10 @@ Status check_frame(const PosedDepthFrame& posed) noexcept {
   const bool size_ok = f.width >= 8 && f.height >= 8 && f.width <= DepthPyramid::kMaxPixels &&
                        f.height <= DepthPyramid::kMaxPixels &&
                        f.depth_m.size() == std::size_t{f.width} * std::size_t{f.height};
-  const bool optics_ok = std::isfinite(f.range_m) && f.range_m > 0.0F && std::isfinite(f.tan_half_fov_ratio) &&
-                         f.tan_half_fov_ratio > 0.0F;
-  if (!size_ok || !optics_ok || !is_finite(posed.X_WC.p_RT) || !posed.X_WC.R_RT.allFinite()) return Status::kInvalidArgument;
+  const bool optics_ok = std::isfinite(f.range_m) && f.range_m > 0.0F &&
+                         std::isfinite(f.tan_half_fov_ratio) && f.tan_half_fov_ratio > 0.0F;
+  if (!size_ok || !optics_ok || !is_finite(posed.X_WC.p_RT) || !posed.X_WC.R_RT.allFinite())
+    return Status::kInvalidArgument;
   const bool any_valid = std::any_of(f.depth_m.begin(), f.depth_m.end(), [](float d) { return d > 0.0F; });
   return any_valid ? Status::kOk : Status::kInvalidArgument;
 }
@@ -20,7 +21,8 @@ Status check_frame(const PosedDepthFrame& posed) noexcept {
 namespace {
 
 /// See the class comment: a lone dropout counts as the nearest of its neighbours.
-void bridge_single_dropouts(const firmware_if::DepthFrame& frame, std::span<DepthPyramid::Bound> entry) noexcept {
+void bridge_single_dropouts(const firmware_if::DepthFrame& frame,
+                            std::span<DepthPyramid::Bound> entry) noexcept {
   const std::size_t width = frame.width;
   const auto seen_m = [&frame](std::size_t i) { return visible_depth_m(frame.depth_m[i], frame.range_m); };
   for (std::size_t y = 0; y < frame.height; ++y) {
@@ -41,7 +43,7 @@ void bridge_single_dropouts(const firmware_if::DepthFrame& frame, std::span<Dept
 
 DepthPyramid::DepthPyramid(core::Arena& arena, std::size_t max_side) noexcept : max_side_(max_side) {
   std::size_t total = 0;
-  for (std::size_t side = max_side; ; side = (side + 1) / 2) {
+  for (std::size_t side = max_side;; side = (side + 1) / 2) {
     total += side * side;
     if (side == 1) break;
   }
@@ -72,7 +74,9 @@ Status DepthPyramid::build(const firmware_if::DepthFrame& frame) noexcept {
         for (int x = 0; x < width; ++x) {
           const int x1 = std::min(2 * x + 1, fine.width - 1);
           const int y1 = std::min(2 * y + 1, fine.height - 1);
-          const auto at = [&fine](int ix, int iy) { return fine.entry[static_cast<std::size_t>(iy * fine.width + ix)]; };
+          const auto at = [&fine](int ix, int iy) {
+            return fine.entry[static_cast<std::size_t>(iy * fine.width + ix)];
+          };
           const Bound a = at(2 * x, 2 * y);
           const Bound b = at(x1, 2 * y);
           const Bound c = at(2 * x, y1);
@@ -93,7 +97,8 @@ Status DepthPyramid::build(const firmware_if::DepthFrame& frame) noexcept {
 DepthPyramid::Bound DepthPyramid::bound(int u0, int v0, int u1, int v1) const noexcept {
   int shift = 0;
   const int last = static_cast<int>(level_count_) - 1;
-  while (shift < last && (((u1 >> shift) - (u0 >> shift)) > 2 || ((v1 >> shift) - (v0 >> shift)) > 2)) ++shift;
+  while (shift < last && (((u1 >> shift) - (u0 >> shift)) > 2 || ((v1 >> shift) - (v0 >> shift)) > 2))
+    ++shift;
   const Level& level = level_[static_cast<std::size_t>(shift)];
   Bound result{3.0e38F, 0.0F};
   for (int y = v0 >> shift; y <= v1 >> shift; ++y) {

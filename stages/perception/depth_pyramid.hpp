@@ -1,4 +1,5 @@
-/// A depth image as a min/max pyramid: how far is every pixel of a rectangle known to see, at least and at most?
+/// A depth image as a min/max pyramid: how far is every pixel of a rectangle known to see, at least and at
+/// most?
 #pragma once
 
 #include <array>
@@ -10,8 +11,9 @@
 
 namespace roborun::stages {
 
-/// kOk if a frame may be used at all: 8..512 pixels a side, as many depths as pixels, finite positive range and field of
-/// view, finite pose, and at least one pixel that is not NaN or <= 0. Otherwise kInvalidArgument. O(pixels) at worst.
+/// kOk if a frame may be used at all: 8..512 pixels a side, as many depths as pixels, finite positive range
+/// and field of view, finite pose, and at least one pixel that is not NaN or <= 0. Otherwise
+/// kInvalidArgument. O(pixels) at worst.
 [[nodiscard]] Status check_frame(const PosedDepthFrame& posed) noexcept;
 
 /// Visible depth of a pixel: its depth, or the range where nothing returned; 0 where there is no information.
@@ -20,9 +22,10 @@ namespace roborun::stages {
   return depth_m < range_m ? depth_m : range_m;
 }
 
-/// A pixel without information (NaN or <= 0) whose neighbours above, below, left and right all have some counts as the
-/// nearest of them: a camera loses one pixel in 200 at random, and near cells have thousands. Larger holes see nothing.
-/// Entry (x, y) of level k covers 2^k x 2^k pixels. Memory from the arena: 8/3 bytes x 4 a pixel.
+/// A pixel without information (NaN or <= 0) whose neighbours above, below, left and right all have some
+/// counts as the nearest of them: a camera loses one pixel in 200 at random, and near cells have thousands.
+/// Larger holes see nothing. Entry (x, y) of level k covers 2^k x 2^k pixels. Memory from the arena: 8/3
+/// bytes x 4 a pixel.
 class DepthPyramid {
  public:
   static constexpr std::size_t kMaxLevels = 10;
@@ -37,7 +40,8 @@ class DepthPyramid {
   DepthPyramid(core::Arena& arena, std::size_t max_side) noexcept;
   /// kCapacity if the image is larger than planned. O(pixels).
   [[nodiscard]] Status build(const firmware_if::DepthFrame& frame) noexcept;
-  /// Pixels [u0, u1] x [v0, v1], inside the image. Conservative: reads at most 3 x 3 entries, which may cover more.
+  /// Pixels [u0, u1] x [v0, v1], inside the image. Conservative: reads at most 3 x 3 entries, which may cover
+  /// more.
   [[nodiscard]] Bound bound(int u0, int v0, int u1, int v1) const noexcept;
 
  private:

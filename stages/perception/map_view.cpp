@@ -9,7 +9,9 @@ namespace {
 constexpr double kMaxSegment_m = 10e3;
 
 /// Number of boxes along `length_m` and their spacing.
-double spacing_m(const MapView& view, double radius_m) noexcept { return std::max(radius_m, 0.5 * view.cell_m()); }
+double spacing_m(const MapView& view, double radius_m) noexcept {
+  return std::max(radius_m, 0.5 * view.cell_m());
+}
 
 }  // namespace
 
@@ -22,17 +24,19 @@ bool is_segment_free(const MapView& view, const Vector3& a_W, const Vector3& b_W
   Vector3 from_W = a_W;
   for (int i = 1; i <= pieces; ++i) {
     const Vector3 to_W = a_W + (static_cast<double>(i) / pieces) * (b_W - a_W);
-    const Aabb swept{from_W.cwiseMin(to_W) - Vector3::Constant(radius_m), from_W.cwiseMax(to_W) + Vector3::Constant(radius_m)};
+    const Aabb swept{from_W.cwiseMin(to_W) - Vector3::Constant(radius_m),
+                     from_W.cwiseMax(to_W) + Vector3::Constant(radius_m)};
     if (!view.is_free(swept, lookups)) return false;
     from_W = to_W;
   }
   return true;
 }
 
-double free_distance_m(const MapView& view, const Vector3& from_W, const Vector3& direction_W, double radius_m,
-                       double max_m, std::uint64_t& lookups) noexcept {
+double free_distance_m(const MapView& view, const Vector3& from_W, const Vector3& direction_W,
+                       double radius_m, double max_m, std::uint64_t& lookups) noexcept {
   const double norm = direction_W.norm();
-  if (!(norm > 0.0) || !std::isfinite(norm) || !is_finite(from_W) || !(max_m > 0.0) || !(radius_m >= 0.0)) return 0.0;
+  if (!(norm > 0.0) || !std::isfinite(norm) || !is_finite(from_W) || !(max_m > 0.0) || !(radius_m >= 0.0))
+    return 0.0;
   if (!view.is_free(Aabb::around(from_W, radius_m), lookups)) return 0.0;
   const double limit_m = std::min(max_m, kMaxSegment_m);
   const double step_m = std::max(0.5 * spacing_m(view, radius_m), 0.05);
@@ -42,7 +46,8 @@ double free_distance_m(const MapView& view, const Vector3& from_W, const Vector3
     const double next_m = std::min(i * step_m, limit_m);
     const Vector3 a_W = from_W + (free_m / norm) * direction_W;
     const Vector3 b_W = from_W + (next_m / norm) * direction_W;
-    const Aabb swept{a_W.cwiseMin(b_W) - Vector3::Constant(radius_m), a_W.cwiseMax(b_W) + Vector3::Constant(radius_m)};
+    const Aabb swept{a_W.cwiseMin(b_W) - Vector3::Constant(radius_m),
+                     a_W.cwiseMax(b_W) + Vector3::Constant(radius_m)};
     if (!view.is_free(swept, lookups)) break;
     free_m = next_m;
   }

@@ -15,23 +15,26 @@ class MapView {
  public:
   virtual ~MapView() = default;
 
-  /// True if every cell of the view that touches the box is known to be free. False for an empty or non-finite box.
-  /// `lookups` grows by the number of cells and nodes visited.
+  /// True if every cell of the view that touches the box is known to be free. False for an empty or
+  /// non-finite box. `lookups` grows by the number of cells and nodes visited.
   [[nodiscard]] virtual bool is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept = 0;
-  /// The state of the cell of the view that contains the point. Occupied wins over unknown, unknown over free.
+  /// The state of the cell of the view that contains the point. Occupied wins over unknown, unknown over
+  /// free.
   [[nodiscard]] virtual CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept = 0;
   /// Edge of the cells, cell_size_m(p1).
   [[nodiscard]] virtual double cell_m() const noexcept = 0;
 };
 
-/// True if a vehicle of this radius can move straight from a to b through known free space: boxes of half-edge
-/// radius_m + spacing / 2 are checked along the segment at a spacing of at most max(radius_m, cell / 2), both ends
-/// included, so that their union covers the swept box. RT-safe: O(length / radius_m) calls of is_free().
-[[nodiscard]] bool is_segment_free(const MapView& view, const Vector3& a_W, const Vector3& b_W, double radius_m,
-                                   std::uint64_t& lookups) noexcept;
+/// True if a vehicle of this radius can move straight from a to b through known free space: boxes of
+/// half-edge radius_m + spacing / 2 are checked along the segment at a spacing of at most max(radius_m, cell
+/// / 2), both ends included, so that their union covers the swept box. RT-safe: O(length / radius_m) calls of
+/// is_free().
+[[nodiscard]] bool is_segment_free(const MapView& view, const Vector3& a_W, const Vector3& b_W,
+                                   double radius_m, std::uint64_t& lookups) noexcept;
 
-/// Distance from `from_W` along `direction_W` (any length, non-zero) that a vehicle of this radius can travel through
-/// known free space, at most max_m; 0 if it is not in free space or the direction is not finite or zero.
+/// Distance from `from_W` along `direction_W` (any length, non-zero) that a vehicle of this radius can travel
+/// through known free space, at most max_m; 0 if it is not in free space or the direction is not finite or
+/// zero.
 [[nodiscard]] double free_distance_m(const MapView& view, const Vector3& from_W, const Vector3& direction_W,
                                      double radius_m, double max_m, std::uint64_t& lookups) noexcept;
 

@@ -21,14 +21,16 @@ struct PosedDepthFrame {
 
 struct IntegrationRequest {
   std::span<const PosedDepthFrame> frames{};
-  int level{0};                              ///< p0: no cell finer than cell_size_m(level) is written.
-  double volume_m3{0.0};                     ///< v0: space nearest to `trajectory_W` first, until this is spent.
-  std::span<const Vector3> trajectory_W{};   ///< Points of the committed trajectory; at least the vehicle itself.
+  int level{0};           ///< p0: no cell finer than cell_size_m(level) is written.
+  double volume_m3{0.0};  ///< v0: space nearest to `trajectory_W` first, until this is spent.
+  std::span<const Vector3>
+      trajectory_W{};  ///< Points of the committed trajectory; at least the vehicle itself.
 };
 
 struct IntegrationResult {
-  core::Work work{};               ///< units: cells and nodes visited; volume_m3: space updated.
-  std::uint32_t frames_refused{};  ///< Frames with a wrong size, a non-finite pose or no valid pixel: not used at all.
+  core::Work work{};  ///< units: cells and nodes visited; volume_m3: space updated.
+  std::uint32_t
+      frames_refused{};  ///< Frames with a wrong size, a non-finite pose or no valid pixel: not used at all.
 };
 
 struct ExportRequest {
@@ -38,9 +40,11 @@ struct ExportRequest {
 };
 
 /// Contract (proved on every implementation by tests/stages/perception/occupancy_map_contract_test.cpp):
-///  1. Space never seen is unknown. A frame that was refused and a hole of NaN pixels change nothing (a single lost pixel
+///  1. Space never seen is unknown. A frame that was refused and a hole of NaN pixels change nothing (a
+///  single lost pixel
 ///     among valid neighbours counts as the nearest of them).
-///  2. After one integration at level 0 of a clean frame, the cells that a ray crossed well before its end are free,
+///  2. After one integration at level 0 of a clean frame, the cells that a ray crossed well before its end
+///  are free,
 ///     and the cell at its end (or a face neighbour) is occupied.
 ///  3. A free write at a coarse level never clears a finer cell in which a surface was seen in this scan.
 ///  4. Evidence is bounded: what moved away is free again after at most 10 scans that look through it.
@@ -49,7 +53,8 @@ class OccupancyMap {
  public:
   virtual ~OccupancyMap() = default;
 
-  /// kOk, or kBudgetSpent (budget or volume: the nearest space was integrated), or kInvalidArgument (no usable frame).
+  /// kOk, or kBudgetSpent (budget or volume: the nearest space was integrated), or kInvalidArgument (no
+  /// usable frame).
   [[nodiscard]] virtual Status integrate(const IntegrationRequest& request, core::StageBudget& budget,
                                          IntegrationResult& result) noexcept = 0;
   /// Makes view() answer for `request`. kOk, or kBudgetSpent (a smaller view), or kInvalidArgument.

@@ -28,7 +28,8 @@ bool PointCloud::add(const Vector3& p_W, double cell_m) noexcept {
   key |= std::uint64_t{1} << 63U;
   const std::size_t mask = grid_.size() - 1;
   std::size_t slot = core::mix64(key) & mask;
-  while (grid_[slot].key != 0 && grid_[slot].key != key) slot = (slot + 1) & mask;  // bounded: never more than 3/4 full
+  while (grid_[slot].key != 0 && grid_[slot].key != key)
+    slot = (slot + 1) & mask;  // bounded: never more than 3/4 full
   if (grid_[slot].key == 0) {
     if (count_ >= grid_.size() - grid_.size() / 4) {
       ++counters_.points_dropped;
@@ -44,7 +45,8 @@ bool PointCloud::add(const Vector3& p_W, double cell_m) noexcept {
   return true;
 }
 
-Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core::StageBudget& budget, core::Work& work) noexcept {
+Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core::StageBudget& budget,
+                        core::Work& work) noexcept {
   ++counters_.steps;
   for (std::size_t i = 0; i < count_; ++i) grid_[used_[i]] = {};
   count_ = 0;
@@ -67,15 +69,18 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core
     for (int v = 0; v < frame.height && !spent; ++v) {
       const double z = t - (v + 0.5) * 2.0 * t / frame.height;
       for (int u = 0; u < frame.width; ++u) {
-        const float raw_m = frame.depth_m[static_cast<std::size_t>(v) * frame.width + static_cast<std::size_t>(u)];
+        const float raw_m =
+            frame.depth_m[static_cast<std::size_t>(v) * frame.width + static_cast<std::size_t>(u)];
         if (!(raw_m > 0.0F)) continue;
         const double y = t - (u + 0.5) * 2.0 * t / frame.width;
         const Vector3 direction_W = posed.X_WC.R_RT * Vector3(1.0, y, z);
         double depth_m = std::fmin(static_cast<double>(raw_m), static_cast<double>(frame.range_m));
         if (raw_m < frame.range_m && !add(posed.X_WC.p_RT + depth_m * direction_W, cell_m)) full = true;
         const double height_m = posed.X_WC.p_RT.z();
-        if (direction_W.z() > 0.0) depth_m = std::fmin(depth_m, std::fmax(high_m_ - height_m, 0.0) / direction_W.z());
-        if (direction_W.z() < 0.0) depth_m = std::fmin(depth_m, std::fmax(height_m - low_m_, 0.0) / -direction_W.z());
+        if (direction_W.z() > 0.0)
+          depth_m = std::fmin(depth_m, std::fmax(high_m_ - height_m, 0.0) / direction_W.z());
+        if (direction_W.z() < 0.0)
+          depth_m = std::fmin(depth_m, std::fmax(height_m - low_m_, 0.0) / -direction_W.z());
         seen_volume_m3_ += pixel_area * depth_m * depth_m * depth_m / 3.0;
       }
       work.units += frame.width;

@@ -1,4 +1,5 @@
-/// Depth images as a point cloud, one averaged point a cell. Source: RoboRun, precision operator p0 of the point cloud.
+/// Depth images as a point cloud, one averaged point a cell. Source: RoboRun, precision operator p0 of the
+/// point cloud.
 #pragma once
 
 #include <cstddef>
@@ -38,13 +39,16 @@ class PointCloud {
   /// Precondition: config.validate() is kOk. Check arena.exhausted() afterwards.
   PointCloud(const Config& config, core::Arena& arena) noexcept;
 
-  /// Averages the surfaces of all frames in cells of cell_size_m(level). Bad frames are refused whole and counted; when
-  /// three quarters of the grid are full, further new cells are dropped and counted (kCapacity). kInvalidArgument if no
-  /// frame was usable. work.units counts pixels. RT-safe: O(pixels), polls the budget every row: kBudgetSpent.
-  [[nodiscard]] Status step(std::span<const PosedDepthFrame> frames, int level, core::StageBudget& budget, core::Work& work) noexcept;
+  /// Averages the surfaces of all frames in cells of cell_size_m(level). Bad frames are refused whole and
+  /// counted; when three quarters of the grid are full, further new cells are dropped and counted
+  /// (kCapacity). kInvalidArgument if no frame was usable. work.units counts pixels. RT-safe: O(pixels),
+  /// polls the budget every row: kBudgetSpent.
+  [[nodiscard]] Status step(std::span<const PosedDepthFrame> frames, int level, core::StageBudget& budget,
+                            core::Work& work) noexcept;
   /// Points of the last step, in the order in which their cells were first met: the same on every machine.
   [[nodiscard]] std::span<const CloudPoint> points() const noexcept { return point_.first(count_); }
-  /// Space between the cameras and what they see in the last step: pyramids of the pixels, cut at the height limits.
+  /// Space between the cameras and what they see in the last step: pyramids of the pixels, cut at the height
+  /// limits.
   [[nodiscard]] double seen_volume_m3() const noexcept { return seen_volume_m3_; }
   /// Space counts only between these heights (what the map stores).
   void set_height_limits(double low_m, double high_m) noexcept;

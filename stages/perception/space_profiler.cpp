@@ -20,22 +20,28 @@ struct Sector {
   double y_m{};
 };
 
-double distance_m(const Sector& a, const Sector& b) noexcept { return core::hypot2(a.x_m - b.x_m, a.y_m - b.y_m); }
+double distance_m(const Sector& a, const Sector& b) noexcept {
+  return core::hypot2(a.x_m - b.x_m, a.y_m - b.y_m);
+}
 
-void profile_gaps(const SpaceProfilerConfig& config, std::span<const CloudPoint> points, const Vector3& p_WB, SpaceProfile& profile) noexcept {
+void profile_gaps(const SpaceProfilerConfig& config, std::span<const CloudPoint> points, const Vector3& p_WB,
+                  SpaceProfile& profile) noexcept {
   std::array<Sector, kSectors> sector{};
   for (const CloudPoint& point : points) {
     const Vector3 offset = point.p_W - p_WB;
     const double range_m = core::hypot2(offset.x(), offset.y());
-    if (std::fabs(offset.z()) > config.height_band_m || range_m > config.gap_reach_m || !(range_m > 0.0)) continue;
+    if (std::fabs(offset.z()) > config.height_band_m || range_m > config.gap_reach_m || !(range_m > 0.0))
+      continue;
     const double turn = (core::atan2(offset.y(), offset.x()) + core::kPi) / (2.0 * core::kPi);
-    Sector& s = sector[static_cast<std::size_t>(std::clamp(static_cast<int>(turn * kSectors), 0, kSectors - 1))];
+    Sector& s =
+        sector[static_cast<std::size_t>(std::clamp(static_cast<int>(turn * kSectors), 0, kSectors - 1))];
     if (range_m < s.range_m) s = {range_m, offset.x(), offset.y()};
   }
   double sum_m = 0.0;
   int count = 0;
   profile.gap_min_m = kInfinity;
-  const auto first = std::find_if(sector.begin(), sector.end(), [](const Sector& s) { return s.range_m < kInfinity; });
+  const auto first =
+      std::find_if(sector.begin(), sector.end(), [](const Sector& s) { return s.range_m < kInfinity; });
   if (first != sector.end()) {
     const auto begin = static_cast<std::size_t>(first - sector.begin());
     Sector last = *first;
@@ -57,21 +63,23 @@ void profile_gaps(const SpaceProfilerConfig& config, std::span<const CloudPoint>
   profile.gap_average_m = count > 0 ? sum_m / count : kInfinity;
 }
 
-void profile_outlook(const SpaceProfilerConfig& config, const MapView& view, const Trajectory& committed, MonotonicTime now,
-                     double radius_m, SpaceProfile& profile, std::uint64_t& lookups) noexcept {
+void profile_outlook(const SpaceProfilerConfig& config, const MapView& view, const Trajectory& committed,
+                     MonotonicTime now, double radius_m, SpaceProfile& profile,
+                     std::uint64_t& lookups) noexcept {
   const double begin_s = std::fmax(seconds(now - committed.start_time), 0.0);
   const double rest_s = std::fmax(committed.duration_s() - begin_s, 0.0);
   double step_s = config.outlook_step_s;
-  for (int i = 0; i < 16 && rest_s / step_s > static_cast<double>(SpaceProfile::kMaxOutlook - 1); ++i) step_s *= 2.0;
+  for (int i = 0; i < 16 && rest_s / step_s > static_cast<double>(SpaceProfile::kMaxOutlook - 1); ++i)
+    step_s *= 2.0;
   profile.outlook_count = 0;
   for (std::size_t i = 0; i < SpaceProfile::kMaxOutlook; ++i) {
     const double ahead_s = static_cast<double>(i) * step_s;
     if (ahead_s > rest_s) break;
     const TrajectoryPoint point = committed.at_s(begin_s + ahead_s);
     const double speed_mps = point.v_W.norm();
-    const double visible_m = speed_mps > 0.05
-                                 ? free_distance_m(view, point.p_W, point.v_W, radius_m, config.max_visible_m, lookups)
-                                 : config.max_visible_m;
+    const double visible_m = speed_mps > 0.05 ? free_distance_m(view, point.p_W, point.v_W, radius_m,
+                                                                config.max_visible_m, lookups)
+                                              : config.max_visible_m;
     profile.outlook[profile.outlook_count++] = {ahead_s, speed_mps, visible_m};
   }
 }

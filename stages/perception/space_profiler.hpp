@@ -12,21 +12,22 @@
 namespace roborun::stages {
 
 struct SpaceProfilerConfig {
-  double vehicle_width_m{1.2};   ///< A gap narrower than this is no gap.
-  double widest_gap_m{20.0};     ///< A gap wider than this does not ask for precision.
-  double gap_reach_m{15.0};      ///< Obstacles farther than this belong to a later decision.
-  double height_band_m{1.5};     ///< Points this much above or below the vehicle can stand in its way.
-  double outlook_step_s{0.25};   ///< Spacing of the samples along the trajectory (doubled until they fit).
-  double max_visible_m{25.0};    ///< The range of the cameras.
+  double vehicle_width_m{1.2};  ///< A gap narrower than this is no gap.
+  double widest_gap_m{20.0};    ///< A gap wider than this does not ask for precision.
+  double gap_reach_m{15.0};     ///< Obstacles farther than this belong to a later decision.
+  double height_band_m{1.5};    ///< Points this much above or below the vehicle can stand in its way.
+  double outlook_step_s{0.25};  ///< Spacing of the samples along the trajectory (doubled until they fit).
+  double max_visible_m{25.0};   ///< The range of the cameras.
 };
 
-/// Gaps: the points in the height band are sorted into 72 sectors of 5 degrees, the nearest point of each kept.
-/// Neighbouring sectors whose ranges differ by less than 3 m show one obstacle; between all others there is a gap: the
-/// distance of their points, counted if the vehicle fits through and it is not wider than widest_gap_m. None: +infinity.
-/// Closest obstacle: nearest point within `relevant_W` (where the vehicle may be, grown by its radius), +infinity if none.
-/// Closest unknown: free distance in `view` ahead along v_WB, at rest towards goal_W; at most max_visible_m.
-/// Outlook: up to 32 samples of the trajectory from `now` to its end, each with the free distance along its motion there.
-/// `lookups` counts map cells visited. RT-safe: O(points + samples * range / cell).
+/// Gaps: the points in the height band are sorted into 72 sectors of 5 degrees, the nearest point of each
+/// kept. Neighbouring sectors whose ranges differ by less than 3 m show one obstacle; between all others
+/// there is a gap: the distance of their points, counted if the vehicle fits through and it is not wider than
+/// widest_gap_m. None: +infinity. Closest obstacle: nearest point within `relevant_W` (where the vehicle may
+/// be, grown by its radius), +infinity if none. Closest unknown: free distance in `view` ahead along v_WB, at
+/// rest towards goal_W; at most max_visible_m. Outlook: up to 32 samples of the trajectory from `now` to its
+/// end, each with the free distance along its motion there. `lookups` counts map cells visited. RT-safe:
+/// O(points + samples * range / cell).
 void profile_space(const SpaceProfilerConfig& config, std::span<const CloudPoint> points, const MapView& view,
                    const Trajectory& committed, MonotonicTime now, const Vector3& p_WB, const Vector3& v_WB,
                    const Vector3& goal_W, const Aabb& relevant_W, double radius_m, SpaceProfile& profile,

@@ -17,34 +17,38 @@ inline constexpr double kUnknownWeight = 2.0;
 
 struct PlanRequest {
   Vector3 start_W = Vector3::Zero();
-  Vector3 goal_W = Vector3::Zero();  ///< Final goal of the mission; most of the time far outside the known space.
-  Aabb bounds_W{};                   ///< The vehicle's centre stays inside.
-  double radius_m{};                 ///< Vehicle and tracking error; every point of the path keeps this box free.
-  double volume_m3{};                ///< v2: stop when the explored volume exceeds it.
-  double horizon_m{};                ///< No point of the path is farther from the start than this.
-  std::uint64_t seed{};              ///< Same request, same map, same seed: same path.
+  Vector3 goal_W =
+      Vector3::Zero();   ///< Final goal of the mission; most of the time far outside the known space.
+  Aabb bounds_W{};       ///< The vehicle's centre stays inside.
+  double radius_m{};     ///< Vehicle and tracking error; every point of the path keeps this box free.
+  double volume_m3{};    ///< v2: stop when the explored volume exceeds it.
+  double horizon_m{};    ///< No point of the path is farther from the start than this.
+  std::uint64_t seed{};  ///< Same request, same map, same seed: same path.
 };
 
 struct PlanResult {
   static constexpr std::size_t kMaxWaypoints = 64;
   core::StaticVector<Vector3, kMaxWaypoints> path_W{};  ///< From the start; empty unless kOk or kBudgetSpent.
-  bool reaches_goal{};  ///< The last way-point is the goal (within one cell).
-  double cost_m{};      ///< Length of the path.
-  core::Work work{};    ///< units: map lookups; volume_m3: space explored by the tree.
+  bool reaches_goal{};                                  ///< The last way-point is the goal (within one cell).
+  double cost_m{};                                      ///< Length of the path.
+  core::Work work{};  ///< units: map lookups; volume_m3: space explored by the tree.
 };
 
 /// Contract (proved on every implementation by tests/stages/planning/planner_contract_test.cpp):
-///  1. Every straight piece of a returned path passes is_segment_free() on the given view. Unknown is not free.
-///  2. If the goal cannot be reached inside known free space, the path leads to the point of it from which the goal
+///  1. Every straight piece of a returned path passes is_segment_free() on the given view. Unknown is not
+///  free.
+///  2. If the goal cannot be reached inside known free space, the path leads to the point of it from which
+///  the goal
 ///     promises to be nearest: least path length plus kUnknownWeight times the remaining straight distance.
-///  3. kStartBlocked, kGoalBlocked (goal occupied or out of bounds, with the path to the nearest point if there is
-///     one), kNoPath (nothing better than the start), kInvalidArgument (not finite, empty bounds) are answers, not
-///     errors; kBudgetSpent comes with the best path so far.
+///  3. kStartBlocked, kGoalBlocked (goal occupied or out of bounds, with the path to the nearest point if
+///  there is
+///     one), kNoPath (nothing better than the start), kInvalidArgument (not finite, empty bounds) are
+///     answers, not errors; kBudgetSpent comes with the best path so far.
 class Planner {
  public:
   virtual ~Planner() = default;
-  [[nodiscard]] virtual Status plan(const PlanRequest& request, const MapView& view, core::StageBudget& budget,
-                                    PlanResult& result) noexcept = 0;
+  [[nodiscard]] virtual Status plan(const PlanRequest& request, const MapView& view,
+                                    core::StageBudget& budget, PlanResult& result) noexcept = 0;
 };
 
 }  // namespace roborun::stages

@@ -13,25 +13,30 @@ constexpr double kVisitedCell_m3 = kVisitedCell_m * kVisitedCell_m * kVisitedCel
 constexpr double kGoalBias = 0.15;
 constexpr double kShortEdge_m = 0.3;  // a node nearer than this to another adds nothing
 constexpr double kEscape_m = 2.0;
-constexpr double kLookAhead_m = 12.0;   // beyond a path's end
-constexpr double kDetour_m = 10.0;      // what a surface right ahead of a path's end costs: the way around a pillar
+constexpr double kLookAhead_m = 12.0;  // beyond a path's end
+constexpr double kDetour_m =
+    10.0;  // what a surface right ahead of a path's end costs: the way around a pillar
 
 Vector3 towards_goal(const PlanRequest& request) noexcept {
   const Vector3 way = request.goal_W - request.start_W;
   const double distance_m = way.norm();
-  return distance_m <= request.horizon_m ? request.goal_W : Vector3(request.start_W + way * (request.horizon_m / distance_m));
+  return distance_m <= request.horizon_m ? request.goal_W
+                                         : Vector3(request.start_W + way * (request.horizon_m / distance_m));
 }
 
 }  // namespace
 
 RrtStar::RrtStar(const Config& config, core::Arena& arena) noexcept
-    : config_(config), node_(arena.take<Node>(config.max_nodes)), visited_(arena.take<std::uint64_t>(kVisited)) {}
+    : config_(config),
+      node_(arena.take<Node>(config.max_nodes)),
+      visited_(arena.take<std::uint64_t>(kVisited)) {}
 
 double RrtStar::promise_m(const Node& node, const Vector3& goal_W) const noexcept {
   return node.cost_m + kUnknownWeight * (goal_W - node.p_W).norm();
 }
 
-double RrtStar::detour_m(const PlanRequest& request, const MapView& view, const Vector3& p_W, std::uint64_t& lookups) const noexcept {
+double RrtStar::detour_m(const PlanRequest& request, const MapView& view, const Vector3& p_W,
+                         std::uint64_t& lookups) const noexcept {
   const Vector3 way = request.goal_W - p_W;
   const double distance_m = way.norm();
   if (distance_m < kShortEdge_m) return 0.0;
@@ -55,7 +60,8 @@ Vector3 RrtStar::sample(const PlanRequest& request, core::CounterRng& rng) const
   const double z = rng.uniform(-1.0, 1.0);
   Vector3 p_W = request.start_W + request.horizon_m * Vector3(x, y, z);
   // The flight band is thin: height is drawn inside it, not inside the sphere.
-  p_W.z() = request.bounds_W.min_W.z() + 0.5 * (z + 1.0) * (request.bounds_W.max_W.z() - request.bounds_W.min_W.z());
+  p_W.z() = request.bounds_W.min_W.z() +
+            0.5 * (z + 1.0) * (request.bounds_W.max_W.z() - request.bounds_W.min_W.z());
   if (kind < kGoalBias) p_W = towards_goal(request) + 3.0 * Vector3(x, y, z);
   return p_W.cwiseMax(request.bounds_W.min_W).cwiseMin(request.bounds_W.max_W);
 }
@@ -68,7 +74,8 @@ void RrtStar::add_node(const Vector3& p_W, std::int32_t parent, double cost_m, c
     key = (key << 21U) | static_cast<std::uint64_t>(static_cast<std::int64_t>(index) + 1048576);
   }
   std::size_t slot = core::mix64(key) % kVisited;
-  // At most max_nodes keys; a table that fills up counts a cell twice, which ends the search earlier, not later.
+  // At most max_nodes keys; a table that fills up counts a cell twice, which ends the search earlier, not
+  // later.
   for (std::size_t probe = 0; probe < 16; ++probe, slot = (slot + 1) % kVisited) {
     if (visited_[slot] == key) return;
     if (visited_[slot] == 0) {
@@ -79,7 +86,8 @@ void RrtStar::add_node(const Vector3& p_W, std::int32_t parent, double cost_m, c
   work.volume_m3 += kVisitedCell_m3;
 }
 
-std::size_t RrtStar::neighbours_of(const Vector3& p_W, double radius_m, std::array<Neighbour, kNeighbours>& found) const noexcept {
+std::size_t RrtStar::neighbours_of(const Vector3& p_W, double radius_m,
+                                   std::array<Neighbour, kNeighbours>& found) const noexcept {
   // The nearest kNeighbours within the radius, nearest first; found[0] is the nearest node even if outside.
   std::size_t count = 0;
   const double radius2 = radius_m * radius_m;
@@ -102,18 +110,22 @@ std::size_t RrtStar::neighbours_of(const Vector3& p_W, double radius_m, std::arr
   return count;
 }
 
-void RrtStar::try_extend(const PlanRequest& request, const MapView& view, const Vector3& sample_W, core::Work& work) noexcept {
+void RrtStar::try_extend(const PlanRequest& request, const MapView& view, const Vector3& sample_W,
+                         core::Work& work) noexcept {
   std::array<Neighbour, kNeighbours> near{};
   (void)neighbours_of(sample_W, 0.0, near);
   const Vector3 from_W = node_[static_cast<std::size_t>(near[0].node)].p_W;
   const double distance_m = near[0].distance_m;
   if (distance_m < kShortEdge_m) return;
-  const Vector3 p_W = distance_m <= config_.step_m ? sample_W : Vector3(from_W + (sample_W - from_W) * (config_.step_m / distance_m));
+  const Vector3 p_W = distance_m <= config_.step_m
+                          ? sample_W
+                          : Vector3(from_W + (sample_W - from_W) * (config_.step_m / distance_m));
   if ((p_W - request.start_W).norm() > request.horizon_m) return;
   if (!view.is_free(Aabb::around(p_W, request.radius_m), work.units)) return;
 
   const double n = static_cast<double>(count_ + 1);
-  const double shrink = std::sqrt(std::sqrt(core::log(n) / n));  // at least the (log n / n)^(1/3) of RRT* asks for
+  const double shrink =
+      std::sqrt(std::sqrt(core::log(n) / n));  // at least the (log n / n)^(1/3) of RRT* asks for
   const double radius_m = std::fmax(config_.rewire_m * std::fmin(1.0, 1.5 * shrink), 1.5);
   const std::size_t count = neighbours_of(p_W, std::fmax(radius_m, (p_W - from_W).norm() + 1e-9), near);
   std::int32_t parent = -1;
@@ -142,7 +154,8 @@ void RrtStar::try_extend(const PlanRequest& request, const MapView& view, const 
   }
 }
 
-void RrtStar::extract(const PlanRequest& request, const MapView& view, std::int32_t node, PlanResult& result) noexcept {
+void RrtStar::extract(const PlanRequest& request, const MapView& view, std::int32_t node,
+                      PlanResult& result) noexcept {
   constexpr std::size_t kMost = PlanResult::kMaxWaypoints;
   std::array<Vector3, kMost> raw{};
   std::size_t count = 0;
@@ -168,15 +181,25 @@ void RrtStar::extract(const PlanRequest& request, const MapView& view, std::int3
 }
 
 Status RrtStar::escape(const PlanRequest& request, const MapView& view, PlanResult& result) const noexcept {
-  // The start box touches something that is not free: the nearest free place that can be reached without touching an
-  // occupied cell, in a fixed order of directions.
-  constexpr std::array<std::array<int, 3>, 10> kDirection{
-      {{0, 0, 1}, {1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {1, 1, 0}, {1, -1, 0}, {-1, 1, 0}, {-1, -1, 0}, {0, 0, -1}}};
+  // The start box touches something that is not free: the nearest free place that can be reached without
+  // touching an occupied cell, in a fixed order of directions.
+  constexpr std::array<std::array<int, 3>, 10> kDirection{{{0, 0, 1},
+                                                           {1, 0, 0},
+                                                           {-1, 0, 0},
+                                                           {0, 1, 0},
+                                                           {0, -1, 0},
+                                                           {1, 1, 0},
+                                                           {1, -1, 0},
+                                                           {-1, 1, 0},
+                                                           {-1, -1, 0},
+                                                           {0, 0, -1}}};
   for (double distance_m = kFinestCell_m; distance_m <= kEscape_m; distance_m += kFinestCell_m) {
     for (const auto& d : kDirection) {
       const Vector3 direction = Vector3(d[0], d[1], d[2]).normalized();
       const Vector3 end_W = request.start_W + distance_m * direction;
-      if (!request.bounds_W.contains(end_W) || !view.is_free(Aabb::around(end_W, request.radius_m), result.work.units)) continue;
+      if (!request.bounds_W.contains(end_W) ||
+          !view.is_free(Aabb::around(end_W, request.radius_m), result.work.units))
+        continue;
       bool clear = true;
       for (double at_m = 0.0; at_m < distance_m && clear; at_m += 0.5 * kFinestCell_m) {
         clear = view.at(request.start_W + at_m * direction, result.work.units) != CellState::kOccupied;
@@ -191,16 +214,19 @@ Status RrtStar::escape(const PlanRequest& request, const MapView& view, PlanResu
   return Status::kStartBlocked;
 }
 
-Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::StageBudget& budget, PlanResult& result) noexcept {
+Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::StageBudget& budget,
+                     PlanResult& result) noexcept {
   result = {};
   const Vector3 size = request.bounds_W.size();
-  if (!is_finite(request.start_W) || !is_finite(request.goal_W) || !(size.minCoeff() > 0.0) || !is_finite(size) ||
-      !(request.radius_m > 0.0) || !(request.horizon_m > 0.0)) {
+  if (!is_finite(request.start_W) || !is_finite(request.goal_W) || !(size.minCoeff() > 0.0) ||
+      !is_finite(size) || !(request.radius_m > 0.0) || !(request.horizon_m > 0.0)) {
     return Status::kInvalidArgument;
   }
   core::Work& work = result.work;
-  if (!view.is_free(Aabb::around(request.start_W, request.radius_m), work.units)) return escape(request, view, result);
-  const bool goal_bad = !request.bounds_W.contains(request.goal_W) || view.at(request.goal_W, work.units) == CellState::kOccupied;
+  if (!view.is_free(Aabb::around(request.start_W, request.radius_m), work.units))
+    return escape(request, view, result);
+  const bool goal_bad = !request.bounds_W.contains(request.goal_W) ||
+                        view.at(request.goal_W, work.units) == CellState::kOccupied;
 
   count_ = 0;
   std::fill(visited_.begin(), visited_.end(), 0U);
@@ -209,7 +235,8 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::Stag
   const double to_target_m = (target_W - request.start_W).norm();
   std::int32_t best = 0;
   if (to_target_m > kShortEdge_m) {
-    const double free_m = free_distance_m(view, request.start_W, target_W - request.start_W, request.radius_m, to_target_m, work.units);
+    const double free_m = free_distance_m(view, request.start_W, target_W - request.start_W, request.radius_m,
+                                          to_target_m, work.units);
     if (free_m > 1.0) {
       add_node(request.start_W + (target_W - request.start_W) * (free_m / to_target_m), 0, free_m, work);
       best = 1;
@@ -267,7 +294,8 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::Stag
   }
 
   // Better than standing still by at least one cell of the view.
-  const double stay_m = promise_m(node_[0], request.goal_W) + detour_m(request, view, request.start_W, work.units);
+  const double stay_m =
+      promise_m(node_[0], request.goal_W) + detour_m(request, view, request.start_W, work.units);
   if (best == 0 || best_m > stay_m - view.cell_m()) return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
   extract(request, view, best, result);
   if (result.path_W.size() < 2) return Status::kNoPath;

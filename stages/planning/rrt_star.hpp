@@ -1,5 +1,5 @@
-/// RRT* in known free space, in fixed memory. Source: Karaman and Frazzoli, "Sampling-based algorithms for optimal motion
-/// planning" (2011); informed rejection after Gammell et al. (2014).
+/// RRT* in known free space, in fixed memory. Source: Karaman and Frazzoli, "Sampling-based algorithms for
+/// optimal motion planning" (2011); informed rejection after Gammell et al. (2014).
 #pragma once
 
 #include <array>
@@ -13,10 +13,10 @@
 
 namespace roborun::stages {
 
-/// The tree grows from the start through known free space only. The goal is most often far outside, so the answer is the
-/// node of least (cost to come + kUnknownWeight * straight distance to the goal + up to 10 m if a surface stands in the way
-/// there), ties by index, then shortened.
-/// Open space costs nothing: if the straight way to the goal (or to the horizon) is free, that is the answer.
+/// The tree grows from the start through known free space only. The goal is most often far outside, so the
+/// answer is the node of least (cost to come + kUnknownWeight * straight distance to the goal + up to 10 m if
+/// a surface stands in the way there), ties by index, then shortened. Open space costs nothing: if the
+/// straight way to the goal (or to the horizon) is free, that is the answer.
 class RrtStar final : public Planner {
  public:
   struct Config {
@@ -28,7 +28,8 @@ class RrtStar final : public Planner {
     std::uint32_t patience{250};
     [[nodiscard]] constexpr Status validate() const noexcept {
       const bool ok = max_nodes >= 16 && max_nodes <= 100000 && max_samples >= 16 && max_samples <= 1000000 &&
-                      step_m >= 0.5 && step_m <= 50 && rewire_m >= 0.5 && rewire_m <= 50 && patience >= 16 && patience <= 1000000;
+                      step_m >= 0.5 && step_m <= 50 && rewire_m >= 0.5 && rewire_m <= 50 && patience >= 16 &&
+                      patience <= 1000000;
       return ok ? Status::kOk : Status::kInvalidArgument;
     }
   };
@@ -39,7 +40,8 @@ class RrtStar final : public Planner {
   RrtStar(const Config& config, core::Arena& arena) noexcept;
 
   /// Explored volume: distinct 4.8 m cells that hold a node, times their size.
-  [[nodiscard]] Status plan(const PlanRequest& request, const MapView& view, core::StageBudget& budget, PlanResult& result) noexcept override;
+  [[nodiscard]] Status plan(const PlanRequest& request, const MapView& view, core::StageBudget& budget,
+                            PlanResult& result) noexcept override;
 
  private:
   static constexpr std::size_t kVisited = 8192;
@@ -55,14 +57,19 @@ class RrtStar final : public Planner {
   };
 
   [[nodiscard]] Vector3 sample(const PlanRequest& request, core::CounterRng& rng) const noexcept;
-  void try_extend(const PlanRequest& request, const MapView& view, const Vector3& sample_W, core::Work& work) noexcept;
-  [[nodiscard]] std::size_t neighbours_of(const Vector3& p_W, double radius_m, std::array<Neighbour, kNeighbours>& found) const noexcept;
+  void try_extend(const PlanRequest& request, const MapView& view, const Vector3& sample_W,
+                  core::Work& work) noexcept;
+  [[nodiscard]] std::size_t neighbours_of(const Vector3& p_W, double radius_m,
+                                          std::array<Neighbour, kNeighbours>& found) const noexcept;
   void add_node(const Vector3& p_W, std::int32_t parent, double cost_m, core::Work& work) noexcept;
   [[nodiscard]] double promise_m(const Node& node, const Vector3& goal_W) const noexcept;
   /// What the first surface on the straight way on to the goal will cost, 0 if none is known within 12 m.
-  [[nodiscard]] double detour_m(const PlanRequest& request, const MapView& view, const Vector3& p_W, std::uint64_t& lookups) const noexcept;
-  void extract(const PlanRequest& request, const MapView& view, std::int32_t node, PlanResult& result) noexcept;
-  [[nodiscard]] Status escape(const PlanRequest& request, const MapView& view, PlanResult& result) const noexcept;
+  [[nodiscard]] double detour_m(const PlanRequest& request, const MapView& view, const Vector3& p_W,
+                                std::uint64_t& lookups) const noexcept;
+  void extract(const PlanRequest& request, const MapView& view, std::int32_t node,
+               PlanResult& result) noexcept;
+  [[nodiscard]] Status escape(const PlanRequest& request, const MapView& view,
+                              PlanResult& result) const noexcept;
 
   Config config_;
   std::span<Node> node_;

@@ -1,9 +1,9 @@
 #include "stages/planning/smoother.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/inverse.hpp"
 #include "core/memory/static_vector.hpp"
 
 namespace roborun::stages {
@@ -16,10 +16,11 @@ using Block = Eigen::Matrix<double, 4, 3>;
 
 constexpr double kSameWaypoint_m = 0.25;
 constexpr double kMinSegment_s = 0.15;
-constexpr double kProfileShare = 0.60;   // of the acceleration limit: the curve around the profile needs the rest
-constexpr double kCornerCut_m = 0.3;     // how far a corner may be cut: the planner leaves about so much room
+constexpr double kProfileShare =
+    0.60;  // of the acceleration limit: the curve around the profile needs the rest
+constexpr double kCornerCut_m = 0.3;  // how far a corner may be cut: the planner leaves about so much room
 constexpr double kLimitTolerance = 1.05;
-constexpr int kSamples = 12;             // per segment, for the limits
+constexpr int kSamples = 12;  // per segment, for the limits
 constexpr int kStretchRounds = 10;
 constexpr int kSplitRounds = 6;
 constexpr int kSlowRounds = 4;
@@ -50,7 +51,7 @@ Smoother::Smoother() noexcept {
       ends(5 + d, k) = product;
     }
   }
-  coefficient_of_ends_ = Eigen::PartialPivLU<Matrix10>(ends).inverse();
+  coefficient_of_ends_ = core::inverse<10>(ends);
   Matrix10 hessian = Matrix10::Zero();
   for (int i = 4; i < 10; ++i) {
     for (int k = 4; k < 10; ++k) {
@@ -59,22 +60,26 @@ Smoother::Smoother() noexcept {
       hessian(i, k) = product / (i + k - 7);
     }
   }
-  snap_cost_ = coefficient_of_ends_.transpose() * hessian * coefficient_of_ends_;
+  const Matrix10 half = hessian.lazyProduct(coefficient_of_ends_);
+  snap_cost_ = coefficient_of_ends_.transpose().lazyProduct(half);
 }
 
-bool Smoother::allocate(std::span<const Vector3> path_W, const TrajectoryPoint& start, const MotionLimits& limits, Plan& plan) const noexcept {
+bool Smoother::allocate(std::span<const Vector3> path_W, const TrajectoryPoint& start,
+                        const MotionLimits& limits, Plan& plan) const noexcept {
   const std::size_t n = path_W.size();
   const double a_mps2 = kProfileShare * limits.acceleration_mps2;
   std::array<double, kMaxKnots> speed_mps{};
   const Vector3 first = (path_W[1] - path_W[0]).normalized();
   speed_mps[0] = std::max(start.v_W.dot(first), 0.0);
   for (std::size_t i = 1; i + 1 < n; ++i) {
-    speed_mps[i] = std::min(limits.speed_mps, corner_speed_mps(path_W[i] - path_W[i - 1], path_W[i + 1] - path_W[i], a_mps2));
+    speed_mps[i] = std::min(limits.speed_mps,
+                            corner_speed_mps(path_W[i] - path_W[i - 1], path_W[i + 1] - path_W[i], a_mps2));
   }
   speed_mps[n - 1] = 0.0;
   for (std::size_t i = n - 1; i-- > 1;) {
     const double length_m = (path_W[i + 1] - path_W[i]).norm();
-    speed_mps[i] = std::min(speed_mps[i], std::sqrt(speed_mps[i + 1] * speed_mps[i + 1] + 2.0 * a_mps2 * length_m));
+    speed_mps[i] =
+        std::min(speed_mps[i], std::sqrt(speed_mps[i + 1] * speed_mps[i + 1] + 2.0 * a_mps2 * length_m));
   }
   plan.count = 0;
   const auto add = [&plan](const Vector3& p_W, double time_s) {
@@ -91,7 +96,9 @@ bool Smoother::allocate(std::span<const Vector3> path_W, const TrajectoryPoint& 
     // Forward: what can be reached from here.
     speed_mps[i + 1] = std::min(speed_mps[i + 1], std::sqrt(v0 * v0 + 2.0 * a_mps2 * length_m));
     const double v1 = speed_mps[i + 1];
-    const double peak = std::max({std::min(limits.speed_mps, std::sqrt(std::max(a_mps2 * length_m + 0.5 * (v0 * v0 + v1 * v1), 0.0))), v1, 0.05});
+    const double peak = std::max(
+        {std::min(limits.speed_mps, std::sqrt(std::max(a_mps2 * length_m + 0.5 * (v0 * v0 + v1 * v1), 0.0))),
+         v1, 0.05});
     const double up_m = std::min(change_m(v0, peak, a_mps2), length_m);
     const double down_m = std::min(change_m(peak, v1, a_mps2), length_m - up_m);
     const double cruise_m = std::max(length_m - up_m - down_m, 0.0);
@@ -151,8 +158,9 @@ bool Smoother::solve(const Plan& plan, const TrajectoryPoint& start, Trajectory&
   if (segments > 1) {
     right[1] -= upper[0].transpose() * x[0];
     std::array<Matrix4, kMaxKnots> gain{};
-    for (std::size_t k = 1; k < segments; ++k) {  // block Gauss elimination; the end is at rest: x[segments] = 0
-      const Matrix4 inverse = Eigen::PartialPivLU<Matrix4>(diagonal[k]).inverse();
+    for (std::size_t k = 1; k < segments;
+         ++k) {  // block Gauss elimination; the end is at rest: x[segments] = 0
+      const Matrix4 inverse = core::inverse<4>(diagonal[k]);
       gain[k] = inverse * upper[k];
       right[k] = (inverse * right[k]).eval();
       if (k + 1 < segments) {
@@ -174,20 +182,23 @@ bool Smoother::solve(const Plan& plan, const TrajectoryPoint& start, Trajectory&
       ends.row(1 + d) = power * x[k].row(d);
       ends.row(6 + d) = power * x[k + 1].row(d);
     }
-    const Ends3 coefficient = coefficient_of_ends_ * ends;
+    const Ends3 coefficient = coefficient_of_ends_.lazyProduct(ends);
     if (!coefficient.allFinite()) return false;
     out.segment[k].duration_s = T;
     power = 1.0;
-    for (int i = 0; i < 10; ++i, power /= T) out.segment[k].coefficient[static_cast<std::size_t>(i)] = power * coefficient.row(i).transpose();
+    for (int i = 0; i < 10; ++i, power /= T)
+      out.segment[k].coefficient[static_cast<std::size_t>(i)] = power * coefficient.row(i).transpose();
   }
   out.brake_begin_s = 0.0;
   for (std::size_t k = 0; k < plan.brake_knot; ++k) out.brake_begin_s += plan.time_s[k + 1];
   return true;
 }
 
-bool Smoother::stretch_to_limits(Plan& plan, const SmoothRequest& request, const MotionLimits& limits, Trajectory& out) const noexcept {
+bool Smoother::stretch_to_limits(Plan& plan, const SmoothRequest& request, const MotionLimits& limits,
+                                 Trajectory& out) const noexcept {
   const double speed_limit = std::max(limits.speed_mps * kLimitTolerance, request.start.v_W.norm() + 0.01);
-  const double acceleration_limit = std::max(limits.acceleration_mps2 * kLimitTolerance, request.start.a_W.norm() + 0.01);
+  const double acceleration_limit =
+      std::max(limits.acceleration_mps2 * kLimitTolerance, request.start.a_W.norm() + 0.01);
   for (int round = 0; round < kStretchRounds; ++round) {
     if (!solve(plan, request.start, out)) return false;
     bool fine = true;
@@ -210,11 +221,14 @@ bool Smoother::stretch_to_limits(Plan& plan, const SmoothRequest& request, const
   return false;
 }
 
-Status Smoother::smooth(const SmoothRequest& request, const MapView& view, core::StageBudget& budget, SmoothResult& result) noexcept {
+Status Smoother::smooth(const SmoothRequest& request, const MapView& view, core::StageBudget& budget,
+                        SmoothResult& result) noexcept {
   result.work = {};
-  const bool finite = is_finite(request.start.p_W) && is_finite(request.start.v_W) && is_finite(request.start.a_W) &&
-                      is_finite(request.start.j_W) && request.limits.speed_mps > 0.0 && request.limits.speed_mps <= 30.0 &&
-                      request.limits.acceleration_mps2 > 0.0 && request.limits.acceleration_mps2 <= 20.0 && request.radius_m > 0.0;
+  const bool finite = is_finite(request.start.p_W) && is_finite(request.start.v_W) &&
+                      is_finite(request.start.a_W) && is_finite(request.start.j_W) &&
+                      request.limits.speed_mps > 0.0 && request.limits.speed_mps <= 30.0 &&
+                      request.limits.acceleration_mps2 > 0.0 && request.limits.acceleration_mps2 <= 20.0 &&
+                      request.radius_m > 0.0;
   if (!finite || request.start.v_W.norm() > 50.0) return Status::kInvalidArgument;
   core::StaticVector<Vector3, kMaxKnots> original;
   for (const Vector3& p_W : request.path_W) {
@@ -266,16 +280,18 @@ Status Smoother::smooth(const SmoothRequest& request, const MapView& view, core:
   return Status::kNoPath;
 }
 
-Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, const MotionLimits& limits, Trajectory& out) const noexcept {
+Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, const MotionLimits& limits,
+                       Trajectory& out) const noexcept {
   const double speed_mps = start.v_W.norm();
-  const bool finite = is_finite(start.p_W) && is_finite(start.v_W) && is_finite(start.a_W) && is_finite(start.j_W);
+  const bool finite =
+      is_finite(start.p_W) && is_finite(start.v_W) && is_finite(start.a_W) && is_finite(start.j_W);
   if (!finite || speed_mps > 50.0 || !(limits.acceleration_mps2 > 0.0)) return Status::kInvalidArgument;
   if (speed_mps < 0.02) {
     out = Trajectory::hold(start.p_W, start_time);
     return Status::kOk;
   }
-  // From the full state if that stays within the limit; otherwise with a step in jerk, at last in acceleration: the vehicle
-  // follows such a reference with a small error, and a wild one not at all.
+  // From the full state if that stays within the limit; otherwise with a step in jerk, at last in
+  // acceleration: the vehicle follows such a reference with a small error, and a wild one not at all.
   Trajectory best;
   double best_mps2 = 1e300;
   const double limit_mps2 = limits.acceleration_mps2 * kLimitTolerance;
@@ -294,7 +310,8 @@ Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, c
       plan.time_s[1] = time_s;
       if (!solve(plan, from, candidate)) continue;
       double worst_mps2 = 0.0;
-      for (int i = 0; i < 2 * kSamples; ++i) worst_mps2 = std::max(worst_mps2, candidate.at_s(time_s * i / (2.0 * kSamples)).a_W.norm());
+      for (int i = 0; i < 2 * kSamples; ++i)
+        worst_mps2 = std::max(worst_mps2, candidate.at_s(time_s * i / (2.0 * kSamples)).a_W.norm());
       if (worst_mps2 >= best_mps2) continue;
       best_mps2 = worst_mps2;
       best = candidate;
@@ -320,8 +337,10 @@ bool is_trajectory_free(const MapView& view, const Trajectory& trajectory, doubl
       const double length_m = (trajectory.at_s(segment_begin_s + duration_s).p_W - last_W).norm() + 0.1;
       const int count = std::clamp(static_cast<int>(2.0 * length_m / radius_m), 6, 200);
       for (int i = 1; i <= count; ++i) {
-        const Vector3 p_W = trajectory.at_s(segment_begin_s + first_s + (duration_s - first_s) * i / count).p_W;
-        const Aabb swept{last_W.cwiseMin(p_W) - Vector3::Constant(radius_m), last_W.cwiseMax(p_W) + Vector3::Constant(radius_m)};
+        const Vector3 p_W =
+            trajectory.at_s(segment_begin_s + first_s + (duration_s - first_s) * i / count).p_W;
+        const Aabb swept{last_W.cwiseMin(p_W) - Vector3::Constant(radius_m),
+                         last_W.cwiseMax(p_W) + Vector3::Constant(radius_m)};
         if (!view.is_free(swept, lookups)) {
           if (segment != nullptr) *segment = k;
           return false;

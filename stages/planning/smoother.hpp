@@ -1,6 +1,7 @@
 /// From a piecewise-straight path to a trajectory that the vehicle can fly and that ends in a stop.
-/// Source: Richter, Bry, Roy, "Polynomial trajectory planning for aggressive quadrotor flight" (2016): minimum snap with
-/// the derivatives at the way-points free, solved in closed form; here as a block-tridiagonal system, O(way-points).
+/// Source: Richter, Bry, Roy, "Polynomial trajectory planning for aggressive quadrotor flight" (2016):
+/// minimum snap with the derivatives at the way-points free, solved in closed form; here as a
+/// block-tridiagonal system, O(way-points).
 #pragma once
 
 #include <array>
@@ -15,8 +16,8 @@
 namespace roborun::stages {
 
 struct MotionLimits {
-  double speed_mps{6.0};           ///< (0, 30]
-  double acceleration_mps2{4.0};   ///< (0, 20]. |a| along the whole trajectory, braking included.
+  double speed_mps{6.0};          ///< (0, 30]
+  double acceleration_mps2{4.0};  ///< (0, 20]. |a| along the whole trajectory, braking included.
 };
 
 struct SmoothRequest {
@@ -24,7 +25,7 @@ struct SmoothRequest {
   TrajectoryPoint start{};            ///< State at the instant when the trajectory takes over.
   MonotonicTime start_time{};
   MotionLimits limits{};
-  double radius_m{};                  ///< This box around every point of the curve must be free.
+  double radius_m{};  ///< This box around every point of the curve must be free.
 };
 
 struct SmoothResult {
@@ -36,18 +37,21 @@ class Smoother {
  public:
   Smoother() noexcept;
 
-  /// Time is given by a trapezoidal speed profile along the path under the limits (corners slower), with a way-point where
-  /// the final braking begins; the curve is then checked: too fast, and the segment gets more time; not free, and the
-  /// straight piece below it gets one more way-point; still not, and the speed limit is lowered.
-  /// kOk: every point of the trajectory keeps its box free in `view`, and speed and acceleration are within the limits
-  /// (5 %; where the start state itself is beyond a limit, never more beyond than there).
-  /// kNoPath: no such curve was found; kBudgetSpent; kInvalidArgument (not finite, fewer than two distinct points): in all
-  /// three cases `result.trajectory` is untouched. RT-safe: at most 24 solutions of at most 47 segments.
-  [[nodiscard]] Status smooth(const SmoothRequest& request, const MapView& view, core::StageBudget& budget, SmoothResult& result) noexcept;
+  /// Time is given by a trapezoidal speed profile along the path under the limits (corners slower), with a
+  /// way-point where the final braking begins; the curve is then checked: too fast, and the segment gets more
+  /// time; not free, and the straight piece below it gets one more way-point; still not, and the speed limit
+  /// is lowered. kOk: every point of the trajectory keeps its box free in `view`, and speed and acceleration
+  /// are within the limits (5 %; where the start state itself is beyond a limit, never more beyond than
+  /// there). kNoPath: no such curve was found; kBudgetSpent; kInvalidArgument (not finite, fewer than two
+  /// distinct points): in all three cases `result.trajectory` is untouched. RT-safe: at most 24 solutions of
+  /// at most 47 segments.
+  [[nodiscard]] Status smooth(const SmoothRequest& request, const MapView& view, core::StageBudget& budget,
+                              SmoothResult& result) noexcept;
 
-  /// The shortest stop along the present velocity within the acceleration limit, or a hold at rest. kInvalidArgument:
-  /// not finite or speed above 50 m/s; `out` untouched. RT-safe: O(1).
-  [[nodiscard]] Status brake(const TrajectoryPoint& start, MonotonicTime start_time, const MotionLimits& limits, Trajectory& out) const noexcept;
+  /// The shortest stop along the present velocity within the acceleration limit, or a hold at rest.
+  /// kInvalidArgument: not finite or speed above 50 m/s; `out` untouched. RT-safe: O(1).
+  [[nodiscard]] Status brake(const TrajectoryPoint& start, MonotonicTime start_time,
+                             const MotionLimits& limits, Trajectory& out) const noexcept;
 
  private:
   static constexpr std::size_t kMaxKnots = Trajectory::kMaxSegments + 1;
@@ -59,17 +63,20 @@ class Smoother {
     std::size_t brake_knot{};                ///< Where the final braking begins.
   };
 
-  [[nodiscard]] bool allocate(std::span<const Vector3> path_W, const TrajectoryPoint& start, const MotionLimits& limits, Plan& plan) const noexcept;
+  [[nodiscard]] bool allocate(std::span<const Vector3> path_W, const TrajectoryPoint& start,
+                              const MotionLimits& limits, Plan& plan) const noexcept;
   [[nodiscard]] bool solve(const Plan& plan, const TrajectoryPoint& start, Trajectory& out) const noexcept;
-  [[nodiscard]] bool stretch_to_limits(Plan& plan, const SmoothRequest& request, const MotionLimits& limits, Trajectory& out) const noexcept;
+  [[nodiscard]] bool stretch_to_limits(Plan& plan, const SmoothRequest& request, const MotionLimits& limits,
+                                       Trajectory& out) const noexcept;
 
   Matrix10 coefficient_of_ends_;  ///< Polynomial on [0, 1] from value and four derivatives at both ends.
   Matrix10 snap_cost_;            ///< Integral of squared snap as a quadratic form of the ends, on [0, 1].
 };
 
-/// True if the curve from `from_s` (seconds after its start) to its end keeps its box free. `segment` (may be null) is set
-/// to the segment in which it does not. RT-safe: O(length / radius).
-[[nodiscard]] bool is_trajectory_free(const MapView& view, const Trajectory& trajectory, double from_s, double radius_m,
-                                      std::uint64_t& lookups, std::size_t* segment = nullptr) noexcept;
+/// True if the curve from `from_s` (seconds after its start) to its end keeps its box free. `segment` (may be
+/// null) is set to the segment in which it does not. RT-safe: O(length / radius).
+[[nodiscard]] bool is_trajectory_free(const MapView& view, const Trajectory& trajectory, double from_s,
+                                      double radius_m, std::uint64_t& lookups,
+                                      std::size_t* segment = nullptr) noexcept;
 
 }  // namespace roborun::stages

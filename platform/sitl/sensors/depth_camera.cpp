@@ -8,7 +8,8 @@
 namespace roborun::sitl {
 
 SimulatedDepthCamera::SimulatedDepthCamera(const World& world, const DepthCameraConfig& config,
-                                           const firmware_if::CameraMount& mount, std::uint64_t seed, std::uint32_t camera)
+                                           const firmware_if::CameraMount& mount, std::uint64_t seed,
+                                           std::uint32_t camera)
     : world_(world), config_(config), mount_(mount), seed_(seed), camera_(camera) {
   const std::size_t n = config.pixels;
   image_.resize(n * n);
@@ -43,13 +44,19 @@ void SimulatedDepthCamera::expose(MonotonicTime now, const Pose& X_WB) noexcept 
 
 Status SimulatedDepthCamera::read(firmware_if::DepthFrame& frame) noexcept {
   const Nanos latency = from_seconds(config_.latency_s);
-  for (std::uint32_t sequence = taken_; sequence > last_read_ && taken_ - sequence < ring_.size(); --sequence) {
+  for (std::uint32_t sequence = taken_; sequence > last_read_ && taken_ - sequence < ring_.size();
+       --sequence) {
     const Exposure& e = ring_[sequence % ring_.size()];
     if (e.lost || e.stamp + latency > now_) continue;
     render(e);
     last_read_ = sequence;
-    frame = {e.stamp, e.sequence, config_.pixels, config_.pixels, static_cast<float>(config_.tan_half_fov_ratio),
-             static_cast<float>(config_.range_m), image_};
+    frame = {e.stamp,
+             e.sequence,
+             config_.pixels,
+             config_.pixels,
+             static_cast<float>(config_.tan_half_fov_ratio),
+             static_cast<float>(config_.range_m),
+             image_};
     return Status::kOk;
   }
   return Status::kNotReady;
@@ -67,10 +74,11 @@ void SimulatedDepthCamera::render(const Exposure& e) noexcept {
       depth_m = std::numeric_limits<double>::quiet_NaN();
     } else if (depth_m < std::numeric_limits<double>::infinity()) {
       // Sum of four 10-bit uniforms: near enough to a Gaussian, and bounded, as a matcher's error is.
-      const double sum = static_cast<double>((bits & 1023U) + ((bits >> 10U) & 1023U) + ((bits >> 20U) & 1023U) +
-                                             ((bits >> 30U) & 1023U));
+      const double sum = static_cast<double>((bits & 1023U) + ((bits >> 10U) & 1023U) +
+                                             ((bits >> 20U) & 1023U) + ((bits >> 30U) & 1023U));
       const double standard = (sum - 2046.0) / 591.2;
-      depth_m = std::fmax(0.01, depth_m + standard * (config_.noise_m + config_.noise_per_m * depth_m * depth_m));
+      depth_m =
+          std::fmax(0.01, depth_m + standard * (config_.noise_m + config_.noise_per_m * depth_m * depth_m));
     }
     image_[i] = static_cast<float>(depth_m);
   }

@@ -48,8 +48,8 @@ void NavigationSensors::sample_imu(const VehicleState& state) noexcept {
   s.sequence = ++imu_sequence_;
   const Vector3 force_W = state.a_WB + Vector3(0.0, 0.0, kGravity_mps2);
   const Vector3 gyro = state.w_WB_B + gyro_bias_B_radps_ + normal3(imu_rng_, config_.gyro_noise_radps);
-  const Vector3 force =
-      state.q_WB.toRotationMatrix().transpose() * force_W + accel_bias_B_mps2_ + normal3(imu_rng_, config_.accel_noise_mps2);
+  const Vector3 force = state.q_WB.toRotationMatrix().transpose() * force_W + accel_bias_B_mps2_ +
+                        normal3(imu_rng_, config_.accel_noise_mps2);
   s.angular_rate_B_radps = to_array(gyro);
   s.specific_force_B_mps2 = to_array(force);
   imu_.push(s, now_);
@@ -57,7 +57,8 @@ void NavigationSensors::sample_imu(const VehicleState& state) noexcept {
 
 void NavigationSensors::sample_gnss(const VehicleState& state) noexcept {
   for (int i = 0; i < 3; ++i) {
-    gnss_wander_W_m_[i] = wander(gnss_wander_W_m_[i], config_.gnss_wander_m, 60.0, 1.0 / config_.gnss_rate_Hz, gnss_rng_);
+    gnss_wander_W_m_[i] =
+        wander(gnss_wander_W_m_[i], config_.gnss_wander_m, 60.0, 1.0 / config_.gnss_rate_Hz, gnss_rng_);
   }
   firmware_if::GnssFix fix;
   fix.stamp = now_;
@@ -79,7 +80,8 @@ void NavigationSensors::sample_gnss(const VehicleState& state) noexcept {
 }
 
 void NavigationSensors::sample_barometer(const VehicleState& state) noexcept {
-  barometer_wander_m_ = wander(barometer_wander_m_, config_.barometer_wander_m, 120.0, 1.0 / config_.barometer_rate_Hz, barometer_rng_);
+  barometer_wander_m_ = wander(barometer_wander_m_, config_.barometer_wander_m, 120.0,
+                               1.0 / config_.barometer_rate_Hz, barometer_rng_);
   firmware_if::BarometerSample s;
   s.stamp = now_;
   s.sequence = ++barometer_sequence_;

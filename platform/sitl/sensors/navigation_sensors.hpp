@@ -14,8 +14,8 @@ namespace roborun::sitl {
 
 struct NavigationSensorsConfig {
   // IMU: an industrial MEMS part (ADIS16470 class), one sample a minor frame.
-  double gyro_noise_radps{0.0012};        ///< One sigma a sample at 400 Hz.
-  double gyro_bias_radps{0.002};          ///< One sigma at switch-on.
+  double gyro_noise_radps{0.0012};  ///< One sigma a sample at 400 Hz.
+  double gyro_bias_radps{0.002};    ///< One sigma at switch-on.
   double accel_noise_mps2{0.03};
   double accel_bias_mps2{0.03};
   // GNSS: two-antenna RTK receiver.
@@ -25,24 +25,30 @@ struct NavigationSensorsConfig {
   double gnss_vertical_m{0.03};
   double gnss_speed_mps{0.03};
   double gnss_heading_rad{0.01};
-  double gnss_wander_m{0.02};             ///< Slow bias, one sigma, correlated over 60 s.
+  double gnss_wander_m{0.02};  ///< Slow bias, one sigma, correlated over 60 s.
   double gnss_dropout_ratio{0.01};
   // Barometer.
   double barometer_rate_Hz{50.0};
   double barometer_latency_s{0.020};
   double barometer_noise_m{0.10};
-  double barometer_wander_m{0.30};        ///< Slow drift, one sigma, correlated over 120 s.
+  double barometer_wander_m{0.30};  ///< Slow drift, one sigma, correlated over 120 s.
 };
 
-class NavigationSensors final : public firmware_if::Imu, public firmware_if::Gnss, public firmware_if::Barometer {
+class NavigationSensors final : public firmware_if::Imu,
+                                public firmware_if::Gnss,
+                                public firmware_if::Barometer {
  public:
   NavigationSensors(const NavigationSensorsConfig& config, std::uint64_t seed) noexcept;
 
   /// To be called once a minor frame with the true state.
   void sample(MonotonicTime now, const VehicleState& state) noexcept;
-  [[nodiscard]] Status read(firmware_if::ImuSample& sample) noexcept override { return imu_.pop(sample, now_); }
+  [[nodiscard]] Status read(firmware_if::ImuSample& sample) noexcept override {
+    return imu_.pop(sample, now_);
+  }
   [[nodiscard]] Status read(firmware_if::GnssFix& fix) noexcept override { return gnss_.pop(fix, now_); }
-  [[nodiscard]] Status read(firmware_if::BarometerSample& s) noexcept override { return barometer_.pop(s, now_); }
+  [[nodiscard]] Status read(firmware_if::BarometerSample& s) noexcept override {
+    return barometer_.pop(s, now_);
+  }
 
  private:
   void sample_imu(const VehicleState& state) noexcept;

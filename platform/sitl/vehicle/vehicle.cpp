@@ -12,7 +12,8 @@ constexpr double kMaxSubstep_s = 1.25e-3;
 
 }  // namespace
 
-Vehicle::Vehicle(const VehicleConfig& config, const WindConfig& wind, const Vector3& p_WB, std::uint64_t seed) noexcept
+Vehicle::Vehicle(const VehicleConfig& config, const WindConfig& wind, const Vector3& p_WB,
+                 std::uint64_t seed) noexcept
     : config_(config), wind_(wind), rng_(seed, 2) {
   state_.p_WB = p_WB;
 }
@@ -51,17 +52,19 @@ void Vehicle::substep(double dt_s) noexcept {
 
   const Matrix3 R_WB = s.q_WB.toRotationMatrix();
   const Vector3 air_W_mps = s.v_WB - wind_W_mps_;
-  const Vector3 drag_W_N = -(config_.drag_linear_Nspm + config_.drag_quadratic_Ns2pm2 * air_W_mps.norm()) * air_W_mps;
+  const Vector3 drag_W_N =
+      -(config_.drag_linear_Nspm + config_.drag_quadratic_Ns2pm2 * air_W_mps.norm()) * air_W_mps;
   s.a_WB = (R_WB.col(2) * total_N + drag_W_N) / config_.mass_kg - Vector3(0.0, 0.0, kGravity_mps2);
 
-  // Front left, front right, rear left, rear right; front left and rear right push the body counter-clockwise.
+  // Front left, front right, rear left, rear right; front left and rear right push the body
+  // counter-clockwise.
   const double arm_m = config_.arm_m;
   const Vector3 torque_B_Nm(arm_m * (thrust_N[0] - thrust_N[1] + thrust_N[2] - thrust_N[3]),
                             arm_m * (-thrust_N[0] - thrust_N[1] + thrust_N[2] + thrust_N[3]),
                             config_.yaw_torque_m * (thrust_N[0] - thrust_N[1] - thrust_N[2] + thrust_N[3]));
   const Vector3 momentum = config_.inertia_kgm2.cwiseProduct(s.w_WB_B);
-  const Vector3 w_dot =
-      (torque_B_Nm - config_.angular_drag_Nms * s.w_WB_B - s.w_WB_B.cross(momentum)).cwiseQuotient(config_.inertia_kgm2);
+  const Vector3 w_dot = (torque_B_Nm - config_.angular_drag_Nms * s.w_WB_B - s.w_WB_B.cross(momentum))
+                            .cwiseQuotient(config_.inertia_kgm2);
 
   s.on_ground = s.p_WB.z() <= 0.0 && s.a_WB.z() <= 0.0;
   if (s.on_ground) {
@@ -89,7 +92,8 @@ double Vehicle::electrical_power_W(double thrust_N, double axial_mps) const noex
   // Rotor momentum theory: induced velocity in axial flight; descent never gives power back.
   const double area_m2 = core::kPi * config_.rotor_radius_m * config_.rotor_radius_m;
   const double half_mps = 0.5 * std::fmax(axial_mps, 0.0);
-  const double induced_mps = -half_mps + std::sqrt(half_mps * half_mps + thrust_N / (2.0 * kAirDensity_kgpm3 * area_m2));
+  const double induced_mps =
+      -half_mps + std::sqrt(half_mps * half_mps + thrust_N / (2.0 * kAirDensity_kgpm3 * area_m2));
   return thrust_N * (induced_mps + std::fmax(axial_mps, 0.0)) / config_.efficiency_ratio;
 }
 

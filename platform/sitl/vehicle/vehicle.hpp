@@ -14,25 +14,25 @@ namespace roborun::sitl {
 inline constexpr double kGravity_mps2 = 9.81;
 
 struct VehicleConfig {
-  double mass_kg{4.5};                                ///< [0.5, 50]. With the span below: hovers at about 515 W.
-  Vector3 inertia_kgm2{0.080, 0.080, 0.140};          ///< About the body axes.
-  double arm_m{0.30};                                 ///< Motor offset from the centre along x and along y.
-  double max_thrust_N{24.5};                          ///< One motor; thrust to weight 2.2.
-  double yaw_torque_m{0.018};                         ///< Reaction torque per newton of thrust.
-  double motor_lag_s{0.040};                          ///< First order. 15 inch propeller on an ESC with closed-loop speed.
-  double drag_linear_Nspm{0.30};                      ///< Rotor drag.
-  double drag_quadratic_Ns2pm2{0.055};                ///< 0.5 * 1.225 kg/m3 * 0.09 m2.
+  double mass_kg{4.5};                        ///< [0.5, 50]. With the span below: hovers at about 515 W.
+  Vector3 inertia_kgm2{0.080, 0.080, 0.140};  ///< About the body axes.
+  double arm_m{0.30};                         ///< Motor offset from the centre along x and along y.
+  double max_thrust_N{24.5};                  ///< One motor; thrust to weight 2.2.
+  double yaw_torque_m{0.018};                 ///< Reaction torque per newton of thrust.
+  double motor_lag_s{0.040};            ///< First order. 15 inch propeller on an ESC with closed-loop speed.
+  double drag_linear_Nspm{0.30};        ///< Rotor drag.
+  double drag_quadratic_Ns2pm2{0.055};  ///< 0.5 * 1.225 kg/m3 * 0.09 m2.
   double angular_drag_Nms{0.02};
-  double rotor_radius_m{0.19};                        ///< Momentum theory: four discs.
-  double efficiency_ratio{0.54};                      ///< Figure of merit times motor and ESC efficiency.
-  double avionics_W{15.0};                            ///< Companion computer, sensors, autopilot.
-  double battery_J{2.2e6};                            ///< 611 Wh: the longest mission of the static design, 1,200 m at 0.5 m/s.
+  double rotor_radius_m{0.19};    ///< Momentum theory: four discs.
+  double efficiency_ratio{0.54};  ///< Figure of merit times motor and ESC efficiency.
+  double avionics_W{15.0};        ///< Companion computer, sensors, autopilot.
+  double battery_J{2.2e6};        ///< 611 Wh: the longest mission of the static design, 1,200 m at 0.5 m/s.
 };
 
 /// Steady wind plus first-order Gauss-Markov gusts on each axis.
 struct WindConfig {
   Vector3 mean_W_mps{1.5, 1.0, 0.0};
-  double gust_mps{0.8};        ///< One sigma an axis, half of it vertically.
+  double gust_mps{0.8};  ///< One sigma an axis, half of it vertically.
   double correlation_s{3.0};
 };
 
@@ -52,7 +52,8 @@ struct VehicleState {
 /// Deterministic: own random numbers, no libm. One minor frame costs well under 2 us.
 class Vehicle final : public firmware_if::Motors {
  public:
-  Vehicle(const VehicleConfig& config, const WindConfig& wind, const Vector3& p_WB, std::uint64_t seed) noexcept;
+  Vehicle(const VehicleConfig& config, const WindConfig& wind, const Vector3& p_WB,
+          std::uint64_t seed) noexcept;
 
   [[nodiscard]] Status command(const firmware_if::MotorCommand& command) noexcept override;
   /// Advances by dt in substeps of at most 1.25 ms. An empty battery gives no thrust.

@@ -18,7 +18,8 @@ constexpr double kMargin_m = 20.0;
 constexpr double kSigmaPerSpread = 0.4;
 
 void require(bool ok, const char* key, double value, const char* range) {
-  if (!ok) throw InputError(fmt::format("environment: {} = {} is out of range: must be {}", key, value, range));
+  if (!ok)
+    throw InputError(fmt::format("environment: {} = {} is out of range: must be {}", key, value, range));
 }
 
 void check(const EnvironmentKnobs& k) {
@@ -28,7 +29,8 @@ void check(const EnvironmentKnobs& k) {
           "above 0, at most 10000 m");
   require(k.grid_m >= 2.0 && k.grid_m <= 100.0, "grid", k.grid_m, "2 .. 100 m");
   require(k.gap_m > 0.0 && k.gap_m < k.grid_m, "gap", k.gap_m, "above 0 and below the grid size");
-  for (const double ratio : k.extra_centroids_ratio) require(ratio >= 0.0 && ratio <= 1.0, "centroid", ratio, "0 .. 1");
+  for (const double ratio : k.extra_centroids_ratio)
+    require(ratio >= 0.0 && ratio <= 1.0, "centroid", ratio, "0 .. 1");
 }
 
 double probability(const EnvironmentKnobs& k, double density_ratio, double distance_m) noexcept {
@@ -55,13 +57,15 @@ World generate(const EnvironmentKnobs& knobs, Mission mission, std::uint64_t see
 
   WorldDescription world;
   const double reach_m = knobs.spread_m + kMargin_m;
-  world.bounds_W = {Vector3(-reach_m, -reach_m, 1.5), Vector3(knobs.centroid_distance_m + reach_m, reach_m, 10.0)};
+  world.bounds_W = {Vector3(-reach_m, -reach_m, 1.5),
+                    Vector3(knobs.centroid_distance_m + reach_m, reach_m, 10.0)};
   world.start_W = Vector3(0.0, 0.0, kCruise_m);
   world.goal_W = Vector3(knobs.centroid_distance_m, 0.0, kCruise_m);
 
   core::CounterRng rng(seed, 1);
   const double radius_m = 0.5 * (knobs.grid_m - knobs.gap_m);
-  const auto columns = static_cast<std::int64_t>(std::ceil((knobs.centroid_distance_m + reach_m) / knobs.grid_m));
+  const auto columns =
+      static_cast<std::int64_t>(std::ceil((knobs.centroid_distance_m + reach_m) / knobs.grid_m));
   const auto rows = static_cast<std::int64_t>(std::ceil(reach_m / knobs.grid_m));
   for (std::int64_t row = -rows; row <= rows; ++row) {
     for (std::int64_t column = -rows; column <= columns; ++column) {
@@ -76,7 +80,8 @@ World generate(const EnvironmentKnobs& knobs, Mission mission, std::uint64_t see
       const double rubble_draw = rng.uniform();
       const double size_draw = rng.uniform();
       const double height_draw = rng.uniform();
-      // A landing position needs its own cell free; goals that fall between cells need the neighbours that touch it.
+      // A landing position needs its own cell free; goals that fall between cells need the neighbours that
+      // touch it.
       const auto too_near = [&](const Vector3& p) {
         return std::fabs(p.x() - x_m) < 0.75 * knobs.grid_m && std::fabs(p.y() - y_m) < 0.75 * knobs.grid_m;
       };
@@ -85,7 +90,8 @@ World generate(const EnvironmentKnobs& knobs, Mission mission, std::uint64_t see
         world.pillars.push_back({x_m, y_m, radius_m, 0.0, kPillarTop_m});
       } else if (rescue && column > columns / 2 && rubble_draw < chance) {
         const double half_m = radius_m * (0.4 + 0.6 * size_draw);
-        world.boxes.push_back({Vector3(x_m - half_m, y_m - half_m, 0.0), Vector3(x_m + half_m, y_m + half_m, 1.0 + 6.0 * height_draw)});
+        world.boxes.push_back({Vector3(x_m - half_m, y_m - half_m, 0.0),
+                               Vector3(x_m + half_m, y_m + half_m, 1.0 + 6.0 * height_draw)});
       }
     }
   }

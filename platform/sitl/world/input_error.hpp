@@ -1,4 +1,5 @@
-/// What a bad name, key, file or number is answered with: one line that says what, where, and what would be right.
+/// What a bad name, key, file or number is answered with: one line that says what, where, and what would be
+/// right.
 #pragma once
 
 #include <stdexcept>

@@ -27,19 +27,24 @@ struct Header {
   double resolution_m{};
 };
 
-[[noreturn]] void refuse(const std::string& name, const std::string& what) { throw InputError(fmt::format("{}: {}", name, what)); }
+[[noreturn]] void refuse(const std::string& name, const std::string& what) {
+  throw InputError(fmt::format("{}: {}", name, what));
+}
 
 Header parse_header(std::span<const unsigned char> bytes, bool full, const std::string& name) {
   const std::string magic = full ? "# Octomap OcTree file" : "# Octomap OcTree binary file";
   const auto line_at = [&](std::size_t& at) {
     std::string line;
-    while (at < bytes.size() && bytes[at] != '\n' && line.size() < 512) line.push_back(static_cast<char>(bytes[at++]));
-    if (at >= bytes.size() || bytes[at] != '\n') refuse(name, "truncated OctoMap header: must hold id, size, res and data lines");
+    while (at < bytes.size() && bytes[at] != '\n' && line.size() < 512)
+      line.push_back(static_cast<char>(bytes[at++]));
+    if (at >= bytes.size() || bytes[at] != '\n')
+      refuse(name, "truncated OctoMap header: must hold id, size, res and data lines");
     ++at;
     return line;
   };
   std::size_t at = 0;
-  if (line_at(at).rfind(magic, 0) != 0) refuse(name, fmt::format("not an OctoMap file: line 1 must be '{}'", magic));
+  if (line_at(at).rfind(magic, 0) != 0)
+    refuse(name, fmt::format("not an OctoMap file: line 1 must be '{}'", magic));
   Header header;
   bool id_ok = false;
   for (int i = 0; i < 64; ++i) {
@@ -47,11 +52,13 @@ Header parse_header(std::span<const unsigned char> bytes, bool full, const std::
     if (line == "data") {
       header.data = at;
       if (!id_ok) refuse(name, "OctoMap header without 'id OcTree'");
-      if (!(header.resolution_m >= 0.001 && header.resolution_m <= 100.0)) refuse(name, "OctoMap header: res must be 0.001 .. 100 m");
+      if (!(header.resolution_m >= 0.001 && header.resolution_m <= 100.0))
+        refuse(name, "OctoMap header: res must be 0.001 .. 100 m");
       return header;
     }
     if (line.rfind("id ", 0) == 0) {
-      if (line != "id OcTree") refuse(name, fmt::format("OctoMap tree of type '{}': only OcTree is read", line.substr(3)));
+      if (line != "id OcTree")
+        refuse(name, fmt::format("OctoMap tree of type '{}': only OcTree is read", line.substr(3)));
       id_ok = true;
     } else if (line.rfind("res ", 0) == 0) {
       header.resolution_m = std::strtod(line.c_str() + 4, nullptr);
@@ -120,9 +127,14 @@ void walk(std::span<const unsigned char> data, bool full, const std::string& nam
     }
     // .bt: all children of a node come before any grandchild in the bits, but depth first in the file.
     switch ((frame.children >> (2U * child)) & 3U) {
-      case 0U: break;                                     // unknown
-      case 1U: on_leaf(Leaf{first, size}, false); break;  // free (bit order: low bit first)
-      case 2U: on_leaf(Leaf{first, size}, true); break;   // occupied
+      case 0U:
+        break;  // unknown
+      case 1U:
+        on_leaf(Leaf{first, size}, false);
+        break;  // free (bit order: low bit first)
+      case 2U:
+        on_leaf(Leaf{first, size}, true);
+        break;  // occupied
       default: {
         if (depth >= kDepth) refuse(name, "OctoMap data deeper than 16 levels");
         unsigned children = 0;
@@ -131,7 +143,8 @@ void walk(std::span<const unsigned char> data, bool full, const std::string& nam
       }
     }
   }
-  if (at != data.size()) refuse(name, fmt::format("{} bytes after the end of the OctoMap tree", data.size() - at));
+  if (at != data.size())
+    refuse(name, fmt::format("{} bytes after the end of the OctoMap tree", data.size() - at));
 }
 
 }  // namespace
@@ -158,12 +171,16 @@ VoxelGrid parse_octomap(std::span<const unsigned char> bytes, bool full, const s
     count[i] = high[i] - low[i];
     voxels *= static_cast<double>(count[i]);
   }
-  if (voxels > kMaxVoxels) refuse(name, fmt::format("the box around all leaves has {:.3g} voxels: at most {:.0e}", voxels, kMaxVoxels));
-  const Vector3 min_W = header.resolution_m * Vector3(static_cast<double>(low[0] - kCentre), static_cast<double>(low[1] - kCentre),
+  if (voxels > kMaxVoxels)
+    refuse(name,
+           fmt::format("the box around all leaves has {:.3g} voxels: at most {:.0e}", voxels, kMaxVoxels));
+  const Vector3 min_W = header.resolution_m * Vector3(static_cast<double>(low[0] - kCentre),
+                                                      static_cast<double>(low[1] - kCentre),
                                                       static_cast<double>(low[2] - kCentre));
   VoxelGrid grid(min_W, header.resolution_m, count);
   walk(data, full, name, [&](const Leaf& leaf, bool occupied) {
-    if (occupied) grid.fill({leaf.first[0] - low[0], leaf.first[1] - low[1], leaf.first[2] - low[2]}, leaf.size);
+    if (occupied)
+      grid.fill({leaf.first[0] - low[0], leaf.first[1] - low[1], leaf.first[2] - low[2]}, leaf.size);
   });
   return grid;
 }

@@ -22,7 +22,8 @@ namespace roborun::sitl {
   try {
     return toml::parse(text, path);
   } catch (const toml::parse_error& error) {
-    throw InputError(fmt::format("{}:{}: not valid TOML: {}", path, error.source().begin.line, error.description()));
+    throw InputError(
+        fmt::format("{}:{}: not valid TOML: {}", path, error.source().begin.line, error.description()));
   }
 }
 
@@ -34,10 +35,12 @@ class TomlReader {
   [[noreturn]] void refuse(const toml::node& node, std::string_view key, std::string_view what) const {
     throw InputError(fmt::format("{}:{}: {}: {}", path_, node.source().begin.line, key, what));
   }
-  void allow_keys(const toml::table& table, std::string_view where, const std::set<std::string_view>& allowed) const {
+  void allow_keys(const toml::table& table, std::string_view where,
+                  const std::set<std::string_view>& allowed) const {
     for (const auto& [key, node] : table) {
       if (allowed.count(key.str()) != 0) continue;
-      refuse(node, key.str(), fmt::format("unknown key in {}: must be one of {}", where, fmt::join(allowed, ", ")));
+      refuse(node, key.str(),
+             fmt::format("unknown key in {}: must be one of {}", where, fmt::join(allowed, ", ")));
     }
   }
   const toml::node& need(const toml::table& table, std::string_view key, std::string_view where) const {

@@ -40,7 +40,8 @@ void VoxelGrid::fill(const std::array<std::int64_t, 3>& first, std::int64_t size
 }
 
 Aabb VoxelGrid::bounds_W() const noexcept {
-  const Vector3 size(static_cast<double>(count_[0]), static_cast<double>(count_[1]), static_cast<double>(count_[2]));
+  const Vector3 size(static_cast<double>(count_[0]), static_cast<double>(count_[1]),
+                     static_cast<double>(count_[2]));
   return {min_W_, min_W_ + cell_m_ * size};
 }
 
@@ -55,7 +56,8 @@ bool VoxelGrid::occupied(const Vector3& p_W) const noexcept {
                   index_of(p_W.z(), min_W_.z(), cell_m_));
 }
 
-double VoxelGrid::hit_distance_m(const Vector3& origin_W, const Vector3& direction_W, double max_m) const noexcept {
+double VoxelGrid::hit_distance_m(const Vector3& origin_W, const Vector3& direction_W,
+                                 double max_m) const noexcept {
   if (bits_.empty()) return kInfinity;
   const Aabb box = bounds_W();
   double enter_m = 0.0;
@@ -90,7 +92,8 @@ double VoxelGrid::hit_distance_m(const Vector3& origin_W, const Vector3& directi
   const std::int64_t limit = count_[0] + count_[1] + count_[2] + 3;
   for (std::int64_t n = 0; n < limit && at_m <= leave_m; ++n) {
     if (occupied(cell[0], cell[1], cell[2])) return at_m;
-    const std::size_t axis = next_m[0] <= next_m[1] ? (next_m[0] <= next_m[2] ? 0U : 2U) : (next_m[1] <= next_m[2] ? 1U : 2U);
+    const std::size_t axis =
+        next_m[0] <= next_m[1] ? (next_m[0] <= next_m[2] ? 0U : 2U) : (next_m[1] <= next_m[2] ? 1U : 2U);
     at_m = next_m[axis];
     next_m[axis] += delta_m[axis];
     cell[axis] += step[axis];
@@ -113,7 +116,8 @@ double VoxelGrid::clearance_m(const Vector3& p_W, double cap_m) const noexcept {
     for (std::int64_t y = low[1]; y <= high[1]; ++y) {
       for (std::int64_t x = low[0]; x <= high[0]; ++x) {
         if (!occupied(x, y, z)) continue;
-        const Vector3 corner = min_W_ + cell_m_ * Vector3(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z));
+        const Vector3 corner = min_W_ + cell_m_ * Vector3(static_cast<double>(x), static_cast<double>(y),
+                                                          static_cast<double>(z));
         const Vector3 nearest = p_W.cwiseMax(corner).cwiseMin(corner + Vector3::Constant(cell_m_));
         best_m = std::min(best_m, (p_W - nearest).norm());
       }

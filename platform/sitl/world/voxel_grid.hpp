@@ -24,7 +24,8 @@ class VoxelGrid {
   [[nodiscard]] bool occupied(std::int64_t ix, std::int64_t iy, std::int64_t iz) const noexcept;
   [[nodiscard]] const std::array<std::int64_t, 3>& count() const noexcept { return count_; }
   /// Distance along a unit direction to the first occupied voxel, +infinity if none within max_m.
-  [[nodiscard]] double hit_distance_m(const Vector3& origin_W, const Vector3& direction_W, double max_m) const noexcept;
+  [[nodiscard]] double hit_distance_m(const Vector3& origin_W, const Vector3& direction_W,
+                                      double max_m) const noexcept;
   /// Distance to the nearest occupied voxel, at most cap_m; 0 inside one.
   [[nodiscard]] double clearance_m(const Vector3& p_W, double cap_m) const noexcept;
 

@@ -79,13 +79,16 @@ Aabb extent_of(const Pillar& p) noexcept {
 
 World::World(WorldDescription description) : description_(std::move(description)) {
   const Aabb& b = description_.bounds_W;
-  if (!is_finite(b.min_W) || !is_finite(b.max_W) || !(b.size().minCoeff() > 0.0) || b.size().maxCoeff() > 20e3) {
+  if (!is_finite(b.min_W) || !is_finite(b.max_W) || !(b.size().minCoeff() > 0.0) ||
+      b.size().maxCoeff() > 20e3) {
     throw InputError("world: bounds must be finite, with min < max on every axis and at most 20 km a side");
   }
-  for (const auto& [name, p] : {std::pair{"start", description_.start_W}, std::pair{"goal", description_.goal_W}}) {
+  for (const auto& [name, p] :
+       {std::pair{"start", description_.start_W}, std::pair{"goal", description_.goal_W}}) {
     if (!is_finite(p) || !b.contains(p)) {
-      throw InputError(fmt::format("world: {} ({}, {}, {}) is outside the bounds x {}..{}, y {}..{}, z {}..{} m", name, p.x(),
-                                   p.y(), p.z(), b.min_W.x(), b.max_W.x(), b.min_W.y(), b.max_W.y(), b.min_W.z(), b.max_W.z()));
+      throw InputError(fmt::format(
+          "world: {} ({}, {}, {}) is outside the bounds x {}..{}, y {}..{}, z {}..{} m", name, p.x(), p.y(),
+          p.z(), b.min_W.x(), b.max_W.x(), b.min_W.y(), b.max_W.y(), b.min_W.z(), b.max_W.z()));
     }
   }
 
@@ -120,13 +123,15 @@ std::size_t World::column(std::int64_t ix, std::int64_t iy) const noexcept {
   return static_cast<std::size_t>(iy * nx_ + ix);
 }
 
-double World::hit_object_m(std::uint32_t object, const Vector3& origin_W, const Vector3& direction_W) const noexcept {
+double World::hit_object_m(std::uint32_t object, const Vector3& origin_W,
+                           const Vector3& direction_W) const noexcept {
   const std::size_t pillar_count = description_.pillars.size();
   return object < pillar_count ? hit_pillar_m(description_.pillars[object], origin_W, direction_W)
                                : hit_box_m(description_.boxes[object - pillar_count], origin_W, direction_W);
 }
 
-double World::hit_distance_m(const Vector3& origin_W, const Vector3& direction_W, double max_m) const noexcept {
+double World::hit_distance_m(const Vector3& origin_W, const Vector3& direction_W,
+                             double max_m) const noexcept {
   double best_m = description_.voxels.hit_distance_m(origin_W, direction_W, max_m);
   if (direction_W.z() < 0.0) best_m = std::min(best_m, std::max(origin_W.z(), 0.0) / -direction_W.z());
   best_m = std::min(best_m, max_m);
@@ -183,8 +188,9 @@ double World::clearance_m(const Vector3& p_W, double cap_m) const noexcept {
       const Range range = column_[column(x, y)];
       for (std::uint32_t i = range.first; i < range.first + range.count; ++i) {
         const std::uint32_t object = object_[i];
-        best_m = std::min(best_m, object < pillar_count ? pillar_distance_m(description_.pillars[object], p_W)
-                                                        : box_distance_m(description_.boxes[object - pillar_count], p_W));
+        best_m = std::min(best_m, object < pillar_count
+                                      ? pillar_distance_m(description_.pillars[object], p_W)
+                                      : box_distance_m(description_.boxes[object - pillar_count], p_W));
       }
     }
   }

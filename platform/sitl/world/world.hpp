@@ -31,8 +31,8 @@ struct WorldDescription {
 
 class World {
  public:
-  /// Builds the search grid. Throws InputError if start or goal is out of bounds, or bounds are empty or not finite,
-  /// or larger than 20 km.
+  /// Builds the search grid. Throws InputError if start or goal is out of bounds, or bounds are empty or not
+  /// finite, or larger than 20 km.
   explicit World(WorldDescription description);
 
   [[nodiscard]] const Aabb& bounds_W() const noexcept { return description_.bounds_W; }
@@ -42,8 +42,10 @@ class World {
   [[nodiscard]] const std::vector<Aabb>& boxes() const noexcept { return description_.boxes; }
   [[nodiscard]] const VoxelGrid& voxels() const noexcept { return description_.voxels; }
 
-  /// Distance along a unit direction to the first surface (obstacle or ground), +infinity if none within max_m.
-  [[nodiscard]] double hit_distance_m(const Vector3& origin_W, const Vector3& direction_W, double max_m) const noexcept;
+  /// Distance along a unit direction to the first surface (obstacle or ground), +infinity if none within
+  /// max_m.
+  [[nodiscard]] double hit_distance_m(const Vector3& origin_W, const Vector3& direction_W,
+                                      double max_m) const noexcept;
   /// Distance from a point to the nearest obstacle (the ground is none), at most cap_m; 0 inside an obstacle.
   [[nodiscard]] double clearance_m(const Vector3& p_W, double cap_m) const noexcept;
   /// Share of 10 m cells within 30 m of (x, y) that hold an obstacle, 0 .. 1: the colour of the heat map.
@@ -55,14 +57,15 @@ class World {
     std::uint32_t count;
   };
   [[nodiscard]] std::size_t column(std::int64_t ix, std::int64_t iy) const noexcept;
-  [[nodiscard]] double hit_object_m(std::uint32_t object, const Vector3& origin_W, const Vector3& direction_W) const noexcept;
+  [[nodiscard]] double hit_object_m(std::uint32_t object, const Vector3& origin_W,
+                                    const Vector3& direction_W) const noexcept;
 
   WorldDescription description_;
   Vector3 grid_min_W_ = Vector3::Zero();
   std::int64_t nx_{1};
   std::int64_t ny_{1};
-  std::vector<Range> column_;           ///< Objects over each grid square, into object_.
-  std::vector<std::uint32_t> object_;   ///< Index of a pillar, or of a box + pillars().size().
+  std::vector<Range> column_;          ///< Objects over each grid square, into object_.
+  std::vector<std::uint32_t> object_;  ///< Index of a pillar, or of a box + pillars().size().
 };
 
 }  // namespace roborun::sitl

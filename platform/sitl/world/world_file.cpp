@@ -21,14 +21,16 @@ constexpr double kVehicleRadius_m = 0.6;
 
 std::vector<unsigned char> read_file(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(fmt::format("{}: cannot be opened: must be a readable .toml, .bt or .ot file", path));
+  if (!file)
+    throw InputError(fmt::format("{}: cannot be opened: must be a readable .toml, .bt or .ot file", path));
   std::vector<unsigned char> bytes;
   std::array<char, 1U << 16U> block{};
   while (file.read(block.data(), block.size()) || file.gcount() > 0) {
     bytes.insert(bytes.end(), block.begin(), block.begin() + file.gcount());
     if (bytes.size() > kMaxFile_bytes) throw InputError(fmt::format("{}: larger than 64 MiB", path));
   }
-  if (file.bad()) throw InputError(fmt::format("{}: cannot be read: must be a readable .toml, .bt or .ot file", path));
+  if (file.bad())
+    throw InputError(fmt::format("{}: cannot be read: must be a readable .toml, .bt or .ot file", path));
   return bytes;
 }
 
@@ -61,14 +63,16 @@ void read_boxes(const TomlReader& reader, const toml::table& root, WorldDescript
     const toml::table* table = node.as_table();
     if (table == nullptr) reader.refuse(node, "box", "must be written as [[box]]");
     reader.allow_keys(*table, "[[box]]", {"min", "max"});
-    const Aabb box{reader.point(reader.need(*table, "min", "[[box]]"), "min"), reader.point(reader.need(*table, "max", "[[box]]"), "max")};
+    const Aabb box{reader.point(reader.need(*table, "min", "[[box]]"), "min"),
+                   reader.point(reader.need(*table, "max", "[[box]]"), "max")};
     if (!(box.size().minCoeff() > 0.0)) reader.refuse(*table, "max", "must be above min on every axis");
     world.boxes.push_back(box);
     if (world.boxes.size() > kMaxObjects) reader.refuse(*table, "box", "more than 100000 boxes");
   }
 }
 
-WorldDescription read_toml(const std::string& path, const std::vector<unsigned char>& bytes, const Endpoints& endpoints) {
+WorldDescription read_toml(const std::string& path, const std::vector<unsigned char>& bytes,
+                           const Endpoints& endpoints) {
   const toml::table root = parse_toml(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   const TomlReader reader(path);
   reader.allow_keys(root, "the file", {"world", "pillar", "box"});
@@ -78,10 +82,14 @@ WorldDescription read_toml(const std::string& path, const std::vector<unsigned c
 
   WorldDescription world;
   const toml::node& bounds = reader.need(*table, "bounds", "[world]");
-  if (bounds.as_array() == nullptr || bounds.as_array()->size() != 2) reader.refuse(bounds, "bounds", "must be [[x, y, z], [x, y, z]] in metres");
-  world.bounds_W = {reader.point((*bounds.as_array())[0], "bounds"), reader.point((*bounds.as_array())[1], "bounds")};
-  world.start_W = endpoints.start_W ? *endpoints.start_W : reader.point(reader.need(*table, "start", "[world]"), "start");
-  world.goal_W = endpoints.goal_W ? *endpoints.goal_W : reader.point(reader.need(*table, "goal", "[world]"), "goal");
+  if (bounds.as_array() == nullptr || bounds.as_array()->size() != 2)
+    reader.refuse(bounds, "bounds", "must be [[x, y, z], [x, y, z]] in metres");
+  world.bounds_W = {reader.point((*bounds.as_array())[0], "bounds"),
+                    reader.point((*bounds.as_array())[1], "bounds")};
+  world.start_W =
+      endpoints.start_W ? *endpoints.start_W : reader.point(reader.need(*table, "start", "[world]"), "start");
+  world.goal_W =
+      endpoints.goal_W ? *endpoints.goal_W : reader.point(reader.need(*table, "goal", "[world]"), "goal");
   read_pillars(reader, root, world);
   read_boxes(reader, root, world);
   return world;
@@ -108,13 +116,16 @@ Vector3 roomiest(const VoxelGrid& voxels, const Aabb& bounds_W, bool at_low_end)
   return best_W;
 }
 
-WorldDescription read_octomap(const std::string& path, const std::vector<unsigned char>& bytes, bool full, const Endpoints& endpoints) {
+WorldDescription read_octomap(const std::string& path, const std::vector<unsigned char>& bytes, bool full,
+                              const Endpoints& endpoints) {
   WorldDescription world;
   world.voxels = parse_octomap(bytes, full, path);
   world.bounds_W = world.voxels.bounds_W();
-  // The simulator's ground is z = 0: maps that reach below it keep their voxels there, but nobody flies there.
+  // The simulator's ground is z = 0: maps that reach below it keep their voxels there, but nobody flies
+  // there.
   world.bounds_W.min_W.z() = std::max(world.bounds_W.min_W.z(), 0.0) + 0.5;
-  if (!(world.bounds_W.size().minCoeff() > 1.0)) throw InputError(fmt::format("{}: less than 1 m of space to fly in above z = 0.5 m", path));
+  if (!(world.bounds_W.size().minCoeff() > 1.0))
+    throw InputError(fmt::format("{}: less than 1 m of space to fly in above z = 0.5 m", path));
   world.start_W = endpoints.start_W ? *endpoints.start_W : roomiest(world.voxels, world.bounds_W, true);
   world.goal_W = endpoints.goal_W ? *endpoints.goal_W : roomiest(world.voxels, world.bounds_W, false);
   return world;
@@ -129,13 +140,15 @@ World load_world(const std::string& path, const Endpoints& endpoints) {
   const bool toml = ends_with(".toml");
   const bool bt = ends_with(".bt");
   const bool ot = ends_with(".ot");
-  if (!toml && !bt && !ot) throw InputError(fmt::format("{}: unknown kind of world file: must end in .toml, .bt or .ot", path));
+  if (!toml && !bt && !ot)
+    throw InputError(fmt::format("{}: unknown kind of world file: must end in .toml, .bt or .ot", path));
   const std::vector<unsigned char> bytes = read_file(path);
   World world(toml ? read_toml(path, bytes, endpoints) : read_octomap(path, bytes, ot, endpoints));
   for (const auto& [name, p_W] : {std::pair{"start", world.start_W()}, std::pair{"goal", world.goal_W()}}) {
     if (world.clearance_m(p_W, kVehicleRadius_m) < kVehicleRadius_m) {
-      throw InputError(fmt::format("{}: {} ({:.2f}, {:.2f}, {:.2f}) is closer than {} m to an obstacle: must be free", path, name,
-                                   p_W.x(), p_W.y(), p_W.z(), kVehicleRadius_m));
+      throw InputError(
+          fmt::format("{}: {} ({:.2f}, {:.2f}, {:.2f}) is closer than {} m to an obstacle: must be free",
+                      path, name, p_W.x(), p_W.y(), p_W.z(), kVehicleRadius_m));
     }
   }
   return world;

@@ -16,20 +16,24 @@ struct Endpoints {
   std::optional<Vector3> goal_W;
 };
 
-/// By extension: .toml, .bt or .ot. Throws InputError (file, line, key, what would be right) for anything that is not a
-/// valid world: unreadable, too large (64 MiB), unknown keys, wrong types, numbers not finite, start or goal occupied or
-/// out of bounds.
+/// By extension: .toml, .bt or .ot. Throws InputError (file, line, key, what would be right) for anything
+/// that is not a valid world: unreadable, too large (64 MiB), unknown keys, wrong types, numbers not finite,
+/// start or goal occupied or out of bounds.
 ///
-/// TOML: tables [world] with bounds = [[x, y, z], [x, y, z]], start = [x, y, z], goal = [x, y, z], and any number of
-///   [[pillar]] with x, y, radius, optional bottom (0) and top (20), and [[box]] with min = [x, y, z], max = [x, y, z];
-///   metres, at most 100,000 objects.
-/// OctoMap: every leaf that its log-odds call occupied becomes solid; the bounds are the box around all leaves, from
-///   0.5 m above its floor; start and goal default to the free-most points near the two ends of the longer side, at the
-///   middle height.
+/// TOML: tables [world] with bounds = [[x, y, z], [x, y, z]], start = [x, y, z], goal = [x, y, z], and any
+/// number of
+///   [[pillar]] with x, y, radius, optional bottom (0) and top (20), and [[box]] with min = [x, y, z], max =
+///   [x, y, z]; metres, at most 100,000 objects.
+/// OctoMap: every leaf that its log-odds call occupied becomes solid; the bounds are the box around all
+/// leaves, from
+///   0.5 m above its floor; start and goal default to the free-most points near the two ends of the longer
+///   side, at the middle height.
 [[nodiscard]] World load_world(const std::string& path, const Endpoints& endpoints);
 
-/// The occupied space of an OctoMap file in memory (.ot if `full`, otherwise .bt). Iterative, at most 16 levels deep, and
-/// never allocates more than the bytes justify; refuses what is truncated, too long or not OctoMap.
-[[nodiscard]] VoxelGrid parse_octomap(std::span<const unsigned char> bytes, bool full, const std::string& name);
+/// The occupied space of an OctoMap file in memory (.ot if `full`, otherwise .bt). Iterative, at most 16
+/// levels deep, and never allocates more than the bytes justify; refuses what is truncated, too long or not
+/// OctoMap.
+[[nodiscard]] VoxelGrid parse_octomap(std::span<const unsigned char> bytes, bool full,
+                                      const std::string& name);
 
 }  // namespace roborun::sitl

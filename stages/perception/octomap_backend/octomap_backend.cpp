@@ -34,14 +34,16 @@ class OctomapBackend final : public OccupancyMap, private MapView {
     }
   }
 
-  [[nodiscard]] Status integrate(const IntegrationRequest& request, core::StageBudget& budget, IntegrationResult& result) noexcept override {
+  [[nodiscard]] Status integrate(const IntegrationRequest& request, core::StageBudget& budget,
+                                 IntegrationResult& result) noexcept override {
     try {
       return insert(request, budget, result);
     } catch (...) {
       return Status::kCapacity;
     }
   }
-  [[nodiscard]] Status export_view(const ExportRequest& request, core::StageBudget&, core::Work& work) noexcept override {
+  [[nodiscard]] Status export_view(const ExportRequest& request, core::StageBudget&,
+                                   core::Work& work) noexcept override {
     try {
       return copy_window(request, work);
     } catch (...) {
@@ -73,16 +75,20 @@ class OctomapBackend final : public OccupancyMap, private MapView {
     double count{};
   };
 
-  /// Grid average of the end points; pixels without a return end beyond the range, where stock insertion only clears.
+  /// Grid average of the end points; pixels without a return end beyond the range, where stock insertion only
+  /// clears.
   static void add_cloud(const PosedDepthFrame& posed, double cell_m, std::map<Key, Mean>& cells) {
     const firmware_if::DepthFrame& frame = posed.frame;
     const double t = static_cast<double>(frame.tan_half_fov_ratio);
     for (int v = 0; v < frame.height; ++v) {
       for (int u = 0; u < frame.width; ++u) {
-        const float raw_m = frame.depth_m[static_cast<std::size_t>(v) * frame.width + static_cast<std::size_t>(u)];
+        const float raw_m =
+            frame.depth_m[static_cast<std::size_t>(v) * frame.width + static_cast<std::size_t>(u)];
         if (!(raw_m > 0.0F)) continue;
-        const Vector3 direction(1.0, t - (u + 0.5) * 2.0 * t / frame.width, t - (v + 0.5) * 2.0 * t / frame.height);
-        const double depth_m = raw_m < frame.range_m ? static_cast<double>(raw_m) : 1.05 * static_cast<double>(frame.range_m);
+        const Vector3 direction(1.0, t - (u + 0.5) * 2.0 * t / frame.width,
+                                t - (v + 0.5) * 2.0 * t / frame.height);
+        const double depth_m =
+            raw_m < frame.range_m ? static_cast<double>(raw_m) : 1.05 * static_cast<double>(frame.range_m);
         const Vector3 p_W = posed.X_WC * (depth_m * direction);
         const auto index = [cell_m](double x) { return static_cast<std::int64_t>(std::floor(x / cell_m)); };
         Mean& mean = cells[{index(p_W.x()), index(p_W.y()), index(p_W.z())}];
@@ -116,7 +122,8 @@ class OctomapBackend final : public OccupancyMap, private MapView {
         for (const Vector3& q_W : request.trajectory_W) nearest_m = std::min(nearest_m, (p_W - q_W).norm());
         ends.emplace_back(nearest_m, p_W);
       }
-      std::stable_sort(ends.begin(), ends.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+      std::stable_sort(ends.begin(), ends.end(),
+                       [](const auto& a, const auto& b) { return a.first < b.first; });
       const double share_m3 = request.volume_m3 / static_cast<double>(request.frames.size());
       double used_m3 = 0.0;
       octomap::Pointcloud cloud;
@@ -129,7 +136,8 @@ class OctomapBackend final : public OccupancyMap, private MapView {
         used_m3 += ray_m3;
         cloud.push_back(to_octomap(p_W));
       }
-      tree.insertPointCloud(cloud, to_octomap(posed.X_WC.p_RT), static_cast<double>(posed.frame.range_m), false, false);
+      tree.insertPointCloud(cloud, to_octomap(posed.X_WC.p_RT), static_cast<double>(posed.frame.range_m),
+                            false, false);
       result.work.volume_m3 += used_m3;
       result.work.units += cloud.size();
       if (budget.spent(result.work)) {
@@ -167,10 +175,14 @@ class OctomapBackend final : public OccupancyMap, private MapView {
     double total_m3 = 0.0;
     for (int v = 0; v < f.height; ++v) {
       for (int u = 0; u < f.width; ++u) {
-        double depth_m = static_cast<double>(visible_depth_m(f.depth_m[static_cast<std::size_t>(v) * f.width + static_cast<std::size_t>(u)], f.range_m));
-        const Vector3 d_W = posed.X_WC.R_RT * Vector3(1.0, t - (u + 0.5) * 2.0 * t / f.width, t - (v + 0.5) * 2.0 * t / f.height);
-        if (d_W.z() > 0.0) depth_m = std::min(depth_m, std::max(config_.bounds_W.max_W.z() - height_m, 0.0) / d_W.z());
-        if (d_W.z() < 0.0) depth_m = std::min(depth_m, std::max(height_m - config_.bounds_W.min_W.z(), 0.0) / -d_W.z());
+        double depth_m = static_cast<double>(visible_depth_m(
+            f.depth_m[static_cast<std::size_t>(v) * f.width + static_cast<std::size_t>(u)], f.range_m));
+        const Vector3 d_W = posed.X_WC.R_RT * Vector3(1.0, t - (u + 0.5) * 2.0 * t / f.width,
+                                                      t - (v + 0.5) * 2.0 * t / f.height);
+        if (d_W.z() > 0.0)
+          depth_m = std::min(depth_m, std::max(config_.bounds_W.max_W.z() - height_m, 0.0) / d_W.z());
+        if (d_W.z() < 0.0)
+          depth_m = std::min(depth_m, std::max(height_m - config_.bounds_W.min_W.z(), 0.0) / -d_W.z());
         total_m3 += area * depth_m * depth_m * depth_m / 3.0;
       }
     }
@@ -187,8 +199,10 @@ class OctomapBackend final : public OccupancyMap, private MapView {
     std::array<std::int64_t, 3> fine{};
     for (std::size_t i = 0; i < 3; ++i) {
       const auto axis = static_cast<Eigen::Index>(i);
-      const double low_m = std::max(request.center_W[axis] - config_.view_reach_m, config_.bounds_W.min_W[axis]);
-      const double high_m = std::min(request.center_W[axis] + config_.view_reach_m, config_.bounds_W.max_W[axis]);
+      const double low_m =
+          std::max(request.center_W[axis] - config_.view_reach_m, config_.bounds_W.min_W[axis]);
+      const double high_m =
+          std::min(request.center_W[axis] + config_.view_reach_m, config_.bounds_W.max_W[axis]);
       min_W_[axis] = std::floor(low_m / coarse_m) * coarse_m;
       fine[i] = 32 * static_cast<std::int64_t>(std::max(std::ceil((high_m - min_W_[axis]) / coarse_m), 0.0));
       count_[i] = fine[i] >> work.level;
@@ -213,12 +227,16 @@ class OctomapBackend final : public OccupancyMap, private MapView {
   }
 
   /// Coarse trees first, finer ones over them.
-  void paint(const std::array<std::int64_t, 3>& fine, std::vector<std::uint8_t>& state, core::Work& work) const {
-    const Vector3 max_W = min_W_ + kFinestCell_m * Vector3(static_cast<double>(fine[0]), static_cast<double>(fine[1]), static_cast<double>(fine[2]));
+  void paint(const std::array<std::int64_t, 3>& fine, std::vector<std::uint8_t>& state,
+             core::Work& work) const {
+    const Vector3 max_W =
+        min_W_ + kFinestCell_m * Vector3(static_cast<double>(fine[0]), static_cast<double>(fine[1]),
+                                         static_cast<double>(fine[2]));
     for (std::size_t level = tree_.size(); level-- > 0;) {
       const octomap::OcTree& tree = *tree_[level];
       if (tree.size() == 0) continue;
-      for (auto it = tree.begin_leafs_bbx(to_octomap(min_W_), to_octomap(max_W)), end = tree.end_leafs_bbx(); it != end; ++it) {
+      for (auto it = tree.begin_leafs_bbx(to_octomap(min_W_), to_octomap(max_W)), end = tree.end_leafs_bbx();
+           it != end; ++it) {
         ++work.units;
         const double half_m = 0.5 * it.getSize();
         std::array<std::int64_t, 3> low{};
@@ -241,11 +259,14 @@ class OctomapBackend final : public OccupancyMap, private MapView {
   }
 
   /// What is farther from the centre than v1 reaches becomes unknown again.
-  void limit_volume(const ExportRequest& request, const std::array<std::int64_t, 3>& fine, std::vector<std::uint8_t>& state, core::Work& work) {
+  void limit_volume(const ExportRequest& request, const std::array<std::int64_t, 3>& fine,
+                    std::vector<std::uint8_t>& state, core::Work& work) {
     constexpr double kCell_m3 = kFinestCell_m * kFinestCell_m * kFinestCell_m;
     std::vector<double> ring_m3(128, 0.0);
     const auto ring_of = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
-      const Vector3 p_W = min_W_ + kFinestCell_m * Vector3(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5, static_cast<double>(z) + 0.5);
+      const Vector3 p_W =
+          min_W_ + kFinestCell_m * Vector3(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5,
+                                           static_cast<double>(z) + 0.5);
       return std::min(static_cast<std::size_t>((p_W - request.center_W).norm()), ring_m3.size() - 1);
     };
     known_m3_ = 0.0;
@@ -259,12 +280,14 @@ class OctomapBackend final : public OccupancyMap, private MapView {
       }
     }
     std::size_t last = 0;
-    while (last < ring_m3.size() && (last < 2 || work.volume_m3 + ring_m3[last] <= request.volume_m3)) work.volume_m3 += ring_m3[last++];
+    while (last < ring_m3.size() && (last < 2 || work.volume_m3 + ring_m3[last] <= request.volume_m3))
+      work.volume_m3 += ring_m3[last++];
     if (last == ring_m3.size()) return;
     for (std::int64_t z = 0; z < fine[2]; ++z) {
       for (std::int64_t y = 0; y < fine[1]; ++y) {
         for (std::int64_t x = 0; x < fine[0]; ++x) {
-          if (ring_of(x, y, z) >= last) state[static_cast<std::size_t>((z * fine[1] + y) * fine[0] + x)] = kUnknown;
+          if (ring_of(x, y, z) >= last)
+            state[static_cast<std::size_t>((z * fine[1] + y) * fine[0] + x)] = kUnknown;
         }
       }
     }
@@ -274,12 +297,15 @@ class OctomapBackend final : public OccupancyMap, private MapView {
   void sum_blocked() {
     const std::int64_t nx = count_[0] + 1, ny = count_[1] + 1;
     sum_.assign(static_cast<std::size_t>(nx * ny * (count_[2] + 1)), 0);
-    const auto at = [&](std::int64_t x, std::int64_t y, std::int64_t z) -> std::int32_t& { return sum_[static_cast<std::size_t>((z * ny + y) * nx + x)]; };
+    const auto at = [&](std::int64_t x, std::int64_t y, std::int64_t z) -> std::int32_t& {
+      return sum_[static_cast<std::size_t>((z * ny + y) * nx + x)];
+    };
     for (std::int64_t z = 1; z <= count_[2]; ++z) {
       for (std::int64_t y = 1; y <= count_[1]; ++y) {
         for (std::int64_t x = 1; x <= count_[0]; ++x) {
-          at(x, y, z) = (cell_[index(x - 1, y - 1, z - 1)] == kFree ? 0 : 1) + at(x - 1, y, z) + at(x, y - 1, z) + at(x, y, z - 1) -
-                        at(x - 1, y - 1, z) - at(x - 1, y, z - 1) - at(x, y - 1, z - 1) + at(x - 1, y - 1, z - 1);
+          at(x, y, z) = (cell_[index(x - 1, y - 1, z - 1)] == kFree ? 0 : 1) + at(x - 1, y, z) +
+                        at(x, y - 1, z) + at(x, y, z - 1) - at(x - 1, y - 1, z) - at(x - 1, y, z - 1) -
+                        at(x, y - 1, z - 1) + at(x - 1, y - 1, z - 1);
         }
       }
     }
@@ -291,7 +317,8 @@ class OctomapBackend final : public OccupancyMap, private MapView {
   [[nodiscard]] bool cell_of(const Vector3& p_W, std::array<std::int64_t, 3>& cell) const noexcept {
     if (cell_.empty() || !config_.bounds_W.contains(p_W)) return false;
     for (std::size_t i = 0; i < 3; ++i) {
-      const double raw = std::floor((p_W[static_cast<Eigen::Index>(i)] - min_W_[static_cast<Eigen::Index>(i)]) / cell_m_);
+      const double raw =
+          std::floor((p_W[static_cast<Eigen::Index>(i)] - min_W_[static_cast<Eigen::Index>(i)]) / cell_m_);
       if (!(raw >= 0.0 && raw < static_cast<double>(count_[i]))) return false;
       cell[i] = static_cast<std::int64_t>(raw);
     }
@@ -304,15 +331,19 @@ class OctomapBackend final : public OccupancyMap, private MapView {
     const bool ordered = (box_W.min_W.array() <= box_W.max_W.array()).all();
     if (!ordered || !cell_of(box_W.min_W, a) || !cell_of(box_W.max_W, b)) return false;
     const std::int64_t nx = count_[0] + 1, ny = count_[1] + 1;
-    const auto at = [&](std::int64_t x, std::int64_t y, std::int64_t z) { return sum_[static_cast<std::size_t>((z * ny + y) * nx + x)]; };
+    const auto at = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+      return sum_[static_cast<std::size_t>((z * ny + y) * nx + x)];
+    };
     const std::int64_t x1 = b[0] + 1, y1 = b[1] + 1, z1 = b[2] + 1;
-    return at(x1, y1, z1) - at(a[0], y1, z1) - at(x1, a[1], z1) - at(x1, y1, a[2]) + at(a[0], a[1], z1) + at(a[0], y1, a[2]) +
-               at(x1, a[1], a[2]) - at(a[0], a[1], a[2]) == 0;
+    return at(x1, y1, z1) - at(a[0], y1, z1) - at(x1, a[1], z1) - at(x1, y1, a[2]) + at(a[0], a[1], z1) +
+               at(a[0], y1, a[2]) + at(x1, a[1], a[2]) - at(a[0], a[1], a[2]) ==
+           0;
   }
   [[nodiscard]] CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept override {
     std::array<std::int64_t, 3> cell{};
     ++lookups;
-    return cell_of(p_W, cell) ? static_cast<CellState>(cell_[index(cell[0], cell[1], cell[2])]) : CellState::kUnknown;
+    return cell_of(p_W, cell) ? static_cast<CellState>(cell_[index(cell[0], cell[1], cell[2])])
+                              : CellState::kUnknown;
   }
   [[nodiscard]] double cell_m() const noexcept override { return cell_m_; }
 

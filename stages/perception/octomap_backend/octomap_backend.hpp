@@ -14,10 +14,10 @@ struct OctomapConfig {
   double view_reach_m{30.0};  ///< Half the side of the exported window.
 };
 
-/// One stock octomap::OcTree for each precision; a scan at p0 goes into the tree of that resolution by insertPointCloud()
-/// of the p0-grid-averaged cloud (pixels without a return clear up to the range). A place is what the finest tree that
-/// knows it says. The export copies the window around the vehicle into cells of p1, as stock users do.
-/// nullptr if memory is short. The library's exceptions end here.
+/// One stock octomap::OcTree for each precision; a scan at p0 goes into the tree of that resolution by
+/// insertPointCloud() of the p0-grid-averaged cloud (pixels without a return clear up to the range). A place
+/// is what the finest tree that knows it says. The export copies the window around the vehicle into cells of
+/// p1, as stock users do. nullptr if memory is short. The library's exceptions end here.
 [[nodiscard]] std::unique_ptr<OccupancyMap> make_octomap_backend(const OctomapConfig& config) noexcept;
 
 }  // namespace roborun::stages

@@ -38,7 +38,8 @@ class SegmentValidator final : public ob::MotionValidator {
   bool checkMotion(const ob::State* a, const ob::State* b) const override {
     return is_segment_free(view_, to_vector(a), to_vector(b), radius_m_, lookups_);
   }
-  bool checkMotion(const ob::State* a, const ob::State* b, std::pair<ob::State*, double>& last) const override {
+  bool checkMotion(const ob::State* a, const ob::State* b,
+                   std::pair<ob::State*, double>& last) const override {
     if (checkMotion(a, b)) return true;
     last.second = 0.0;
     if (last.first != nullptr) si_->copyState(last.first, a);
@@ -55,7 +56,8 @@ class OmplPlanner final : public Planner {
  public:
   OmplPlanner(std::string name, const OmplConfig& config) : name_(std::move(name)), config_(config) {}
 
-  [[nodiscard]] Status plan(const PlanRequest& request, const MapView& view, core::StageBudget& budget, PlanResult& result) noexcept override {
+  [[nodiscard]] Status plan(const PlanRequest& request, const MapView& view, core::StageBudget& budget,
+                            PlanResult& result) noexcept override {
     try {
       return solve(request, view, budget, result);
     } catch (...) {
@@ -71,16 +73,22 @@ class OmplPlanner final : public Planner {
     return std::make_shared<og::BITstar>(info);
   }
 
-  Status solve(const PlanRequest& request, const MapView& view, core::StageBudget& budget, PlanResult& result) {
+  Status solve(const PlanRequest& request, const MapView& view, core::StageBudget& budget,
+               PlanResult& result) {
     result = {};
-    const Vector3 low = request.bounds_W.min_W.cwiseMax(request.start_W - Vector3::Constant(request.horizon_m));
-    const Vector3 high = request.bounds_W.max_W.cwiseMin(request.start_W + Vector3::Constant(request.horizon_m));
-    if (!is_finite(request.start_W) || !is_finite(request.goal_W) || !((high - low).minCoeff() > 0.0) || !(request.radius_m > 0.0)) {
+    const Vector3 low =
+        request.bounds_W.min_W.cwiseMax(request.start_W - Vector3::Constant(request.horizon_m));
+    const Vector3 high =
+        request.bounds_W.max_W.cwiseMin(request.start_W + Vector3::Constant(request.horizon_m));
+    if (!is_finite(request.start_W) || !is_finite(request.goal_W) || !((high - low).minCoeff() > 0.0) ||
+        !(request.radius_m > 0.0)) {
       return Status::kInvalidArgument;
     }
     core::Work& work = result.work;
-    if (!view.is_free(Aabb::around(request.start_W, request.radius_m), work.units)) return Status::kStartBlocked;
-    const bool goal_bad = !request.bounds_W.contains(request.goal_W) || view.at(request.goal_W, work.units) == CellState::kOccupied;
+    if (!view.is_free(Aabb::around(request.start_W, request.radius_m), work.units))
+      return Status::kStartBlocked;
+    const bool goal_bad = !request.bounds_W.contains(request.goal_W) ||
+                          view.at(request.goal_W, work.units) == CellState::kOccupied;
 
     const auto space = std::make_shared<ob::RealVectorStateSpace>(3);
     ob::RealVectorBounds bounds(3);
@@ -90,14 +98,18 @@ class OmplPlanner final : public Planner {
     }
     space->setBounds(bounds);
     const auto info = std::make_shared<ob::SpaceInformation>(space);
-    info->setStateValidityChecker([&](const ob::State* s) { return view.is_free(Aabb::around(to_vector(s), request.radius_m), work.units); });
-    info->setMotionValidator(std::make_shared<SegmentValidator>(info.get(), view, request.radius_m, work.units));
+    info->setStateValidityChecker([&](const ob::State* s) {
+      return view.is_free(Aabb::around(to_vector(s), request.radius_m), work.units);
+    });
+    info->setMotionValidator(
+        std::make_shared<SegmentValidator>(info.get(), view, request.radius_m, work.units));
     info->setup();
 
     const auto problem = std::make_shared<ob::ProblemDefinition>(info);
     ob::ScopedState<ob::RealVectorStateSpace> start(space);
     ob::ScopedState<ob::RealVectorStateSpace> goal(space);
-    // Outside the box or unknown, the goal is moved onto its border: the nearest approximation of it is what is asked for.
+    // Outside the box or unknown, the goal is moved onto its border: the nearest approximation of it is what
+    // is asked for.
     const Vector3 target_W = request.goal_W.cwiseMax(low).cwiseMin(high);
     for (unsigned i = 0; i < 3; ++i) {
       start[i] = request.start_W[i];
@@ -114,7 +126,8 @@ class OmplPlanner final : public Planner {
     const ob::PlannerTerminationCondition stop([&] {
       work.volume_m3 = std::min(request.volume_m3, 0.1 * kExplored_m3 * checks);
       spent = budget.spent(work);
-      return spent || ++checks > config_.max_iterations || (problem->hasExactSolution() && checks > config_.max_iterations / 4);
+      return spent || ++checks > config_.max_iterations ||
+             (problem->hasExactSolution() && checks > config_.max_iterations / 4);
     });
     (void)planner->solve(stop);
     const ob::PathPtr solution = problem->getSolutionPath();
@@ -126,7 +139,9 @@ class OmplPlanner final : public Planner {
       (void)result.path_W.push_back(p_W);
     }
     const Vector3 end_W = result.path_W.back();
-    const double gain_m = kUnknownWeight * ((request.goal_W - request.start_W).norm() - (request.goal_W - end_W).norm()) - result.cost_m;
+    const double gain_m =
+        kUnknownWeight * ((request.goal_W - request.start_W).norm() - (request.goal_W - end_W).norm()) -
+        result.cost_m;
     if (result.path_W.size() < 2 || gain_m < view.cell_m()) {
       result.path_W.clear();
       return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
@@ -144,7 +159,8 @@ class OmplPlanner final : public Planner {
 
 std::unique_ptr<Planner> make_ompl_planner(std::string_view name, const OmplConfig& config) noexcept {
   try {
-    if (name != "RRTstar" && name != "InformedRRTstar" && name != "RRTConnect" && name != "BITstar") return nullptr;
+    if (name != "RRTstar" && name != "InformedRRTstar" && name != "RRTConnect" && name != "BITstar")
+      return nullptr;
     ompl::msg::setLogLevel(ompl::msg::LOG_NONE);
     ompl::RNG::setSeed(kSeed);
     return std::make_unique<OmplPlanner>(std::string(name), config);
