@@ -28,7 +28,7 @@ LatencyModel from_cost(const core::StageCost& cost) noexcept { return {cost.fixe
 
 Eq4Fit fit_eq4(std::span<const LatencyPoint> points) noexcept {
   using Vector4 = Eigen::Vector4d;
-  const auto row_of = [](const LatencyPoint& point) {
+  const auto row_of = [](const LatencyPoint& point) -> Vector4 {
     const double r = 1.0 / cell_size_m(point.level);
     return Vector4(r * r * r * point.volume_m3, r * r * point.volume_m3, r * point.volume_m3, 1.0) /
            point.latency_s;

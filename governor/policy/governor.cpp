@@ -206,8 +206,10 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
     d.solution.v1_m3 = d.solution.v0_m3;
     d.solution.v2_m3 = policy.planner_share * d.solution.v0_m3;
     fill_prediction(d);
-    deadline_s = std::max(deadline_s,
-                          needed_s(d.solution.p1_level, policy.least_share) + seconds(config_.minor_frame));
+    double total_s = 0.0;
+    for (const double stage_s : d.predicted_s) total_s += stage_s;
+    deadline_s =
+        std::max(deadline_s, total_s * (1.0 + policy.reserve_ratio) + seconds(config_.minor_frame));
   }
 
   // 4. How fast may the next trajectory be?

@@ -9,7 +9,8 @@ namespace {
 constexpr double kSameObjective_s2 = 1e-12;
 constexpr double kSameVolume_m3 = 1e-6;
 
-double at_least_zero(double value) noexcept { return value > 0.0 ? value : 0.0; }  // NaN gives 0
+/// Into [0, 1e12]; NaN gives 0. The upper end keeps infinite bounds out of differences.
+double at_least_zero(double value) noexcept { return value > 0.0 ? std::min(value, 1e12) : 0.0; }
 
 struct Bounds {
   int finest{};    ///< Of p0.
@@ -43,7 +44,7 @@ Bounds bounds_of(const SolverProblem& p) noexcept {
 
 /// Largest x in [0, most] with slope * x <= time; all of it if it costs nothing.
 double affordable(double time_s, double slope, double most) noexcept {
-  return slope * most <= time_s ? most : std::max(time_s, 0.0) / slope;
+  return !(slope > 0.0) || slope * most <= time_s ? most : std::max(time_s, 0.0) / slope;
 }
 
 bool better(const SolverSolution& a, const SolverSolution& b) noexcept {

@@ -11,8 +11,7 @@ target_include_directories(roborun_flags INTERFACE ${CMAKE_SOURCE_DIR})
 target_compile_options(roborun_flags INTERFACE
   -ffp-contract=off -fsigned-char -fstack-protector-strong
   -Wall -Wextra -Wpedantic -Werror -Wconversion -Wsign-conversion -Wdouble-promotion
-  -Wold-style-cast -Wcast-align -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Wvla
-  -Wno-maybe-uninitialized)  # GCC 12 sees ghosts in Eigen
+  -Wold-style-cast -Wcast-align -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Wvla)
 target_compile_definitions(roborun_flags INTERFACE EIGEN_DONT_VECTORIZE EIGEN_MPL2_ONLY)
 target_link_libraries(roborun_flags INTERFACE Eigen3::Eigen)
 get_target_property(_eigen_include Eigen3::Eigen INTERFACE_INCLUDE_DIRECTORIES)

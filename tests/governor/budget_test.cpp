@@ -1,0 +1,120 @@
+#include "governor/budget/time_budget.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/random/counter_rng.hpp"
+
+namespace roborun::governor {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr BudgetLimits kLimits{Nanos{1'000'000}, Nanos{15'000'000'000}};
+
+TEST(StoppingModel, RecomputesThePublishedFit) {
+  constexpr std::array<std::array<double, 2>, 6> kPoint{
+      {{0.995, 0.266}, {1.975, 0.598}, {3.921, 2.162}, {5.834, 3.539}, {7.712, 5.985}, {9.563, 8.151}}};
+  double error = 0.0;
+  for (const auto& p : kPoint) {
+    const double relative = kRoborunStopping.distance_m(p[0]) / p[1] - 1.0;
+    error += relative * relative / kPoint.size();
+  }
+  EXPECT_NEAR(error, 0.0165, 0.0005) << "published: 1.65 %";
+}
+
+TEST(StoppingModel, IsNeverNegativeAndAnUnknownSpeedNeverStops) {
+  EXPECT_EQ(kRoborunStopping.distance_m(0.3), 0.0) << "the printed polynomial is negative below 0.53 m/s";
+  EXPECT_EQ(kRoborunStopping.distance_m(-5.0), 0.0);
+  EXPECT_EQ(kRoborunStopping.distance_m(kNan), std::numeric_limits<double>::infinity());
+}
+
+TEST(TimeBudget, IsEquationOne) {
+  // (25 - (0.05494 * 36 + 0.3549 * 6 - 0.2038)) / 6 = (25 - 3.90344) / 6 = 3.51609 s.
+  EXPECT_NEAR(seconds(time_budget(25.0, 6.0, kRoborunStopping, kLimits)), 3.51609, 1e-4);
+}
+
+TEST(TimeBudget, TreatsNanAsNear) {
+  EXPECT_EQ(time_budget(kNan, 3.0, kRoborunStopping, kLimits), kLimits.shortest);
+  EXPECT_EQ(time_budget(10.0, kNan, kRoborunStopping, kLimits), kLimits.shortest);
+}
+
+TEST(TimeBudget, GivesAStandingVehicleTheLongest) {
+  EXPECT_EQ(time_budget(10.0, 0.0, kRoborunStopping, kLimits), kLimits.longest);
+  EXPECT_EQ(time_budget(0.0, 0.0, kRoborunStopping, kLimits), kLimits.shortest) << "nothing is visible";
+}
+
+TEST(TimeBudget, NeverGrowsWithSpeedNorShrinksWithVisibility) {
+  for (double d = 0.0; d < 30.0; d += 0.7) {
+    Nanos last = kLimits.longest;
+    for (double v = 0.0; v < 12.0; v += 0.05) {
+      const Nanos budget = time_budget(d, v, kRoborunStopping, kLimits);
+      ASSERT_LE(budget, last);
+      ASSERT_LE(budget, time_budget(d + 0.5, v, kRoborunStopping, kLimits));
+      last = budget;
+    }
+  }
+}
+
+/// Algorithm 1 in steps of 1 ms: the remaining budget runs down with time and is never more than Eq. 1 allows.
+double dense_reference_s(std::span<const TrajectoryOutlook> w) {
+  constexpr double kStep_s = 1e-3;
+  double remaining_s = 15.0;
+  for (double t = 0.0; t < 15.0; t += kStep_s) {
+    TrajectoryOutlook here = w.back();
+    for (std::size_t i = 0; i + 1 < w.size(); ++i) {
+      if (t < w[i].time_s || t >= w[i + 1].time_s) continue;
+      const double share = (t - w[i].time_s) / (w[i + 1].time_s - w[i].time_s);
+      here.speed_mps = w[i].speed_mps + share * (w[i + 1].speed_mps - w[i].speed_mps);
+      here.visible_m = w[i].visible_m + share * (w[i + 1].visible_m - w[i].visible_m);
+    }
+    const double rest_m = here.visible_m - kRoborunStopping.distance_m(here.speed_mps);
+    const double local_s = here.speed_mps <= 0.0 ? (rest_m > 0.0 ? 15.0 : 0.0) : std::clamp(rest_m / here.speed_mps, 0.0, 15.0);
+    remaining_s = std::min(remaining_s, local_s);
+    if (remaining_s <= 0.0) return t;
+    remaining_s -= kStep_s;
+  }
+  return 15.0;
+}
+
+TEST(TrajectoryBudget, IsNeverMoreOptimisticThanADenseReference) {
+  core::CounterRng rng(3);
+  double worst_pessimism_s = 0.0;
+  for (int n = 0; n < 300; ++n) {
+    std::array<TrajectoryOutlook, 12> w{};
+    double t = 0.0;
+    double v = rng.uniform(0.0, 6.0);
+    double d = rng.uniform(2.0, 25.0);
+    for (TrajectoryOutlook& o : w) {
+      o = {t, v, d};
+      t += 0.25;
+      v = std::clamp(v + rng.uniform(-0.6, 0.6), 0.0, 8.0);
+      d = std::clamp(d + rng.uniform(-2.0, 2.0), 0.0, 25.0);
+    }
+    const double exact_s = seconds(trajectory_budget(w, kRoborunStopping, kLimits));
+    const double dense_s = dense_reference_s(w);
+    ASSERT_LE(exact_s, dense_s + 2e-3);  // the reference's own step, twice
+    worst_pessimism_s = std::max(worst_pessimism_s, dense_s - exact_s);
+  }
+  EXPECT_LT(worst_pessimism_s, 0.25);
+  EXPECT_GT(worst_pessimism_s, 0.0);
+}
+
+TEST(TrajectoryBudget, CountsPartOfTheFirstSegment) {
+  // One long segment at constant speed 4 m/s: Eq. 1 at its start gives (10 - 2.095) / 4 = 1.976 s, less than the segment's 5 s.
+  // Whole segments only (as printed) would give 0.
+  const std::array<TrajectoryOutlook, 2> w{{{0.0, 4.0, 10.0}, {5.0, 4.0, 10.0}}};
+  EXPECT_NEAR(seconds(trajectory_budget(w, kRoborunStopping, kLimits)), (10.0 - kRoborunStopping.distance_m(4.0)) / 4.0, 1e-6);
+}
+
+TEST(TrajectoryBudget, RefusesToGuess) {
+  EXPECT_EQ(trajectory_budget({}, kRoborunStopping, kLimits), kLimits.shortest);
+  const std::array<TrajectoryOutlook, 2> w{{{0.0, 1.0, 10.0}, {1.0, kNan, 10.0}}};
+  EXPECT_EQ(trajectory_budget(w, kRoborunStopping, kLimits), kLimits.shortest);
+}
+
+}  // namespace
+}  // namespace roborun::governor

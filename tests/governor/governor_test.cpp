@@ -1,0 +1,152 @@
+#include "governor/policy/governor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "core/random/counter_rng.hpp"
+#include "tests/support/no_alloc_scope.hpp"
+
+namespace roborun::governor {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+GovernorConfig paper_config(Design design) {
+  static const core::CostProfile costs = core::paper_profile();
+  GovernorConfig c;
+  c.design = design;
+  c.model = {from_cost(costs.of(core::StageId::kMap)), from_cost(costs.of(core::StageId::kExport)), from_cost(costs.of(core::StageId::kPlanner))};
+  c.point_cloud_s = 0.37;
+  c.governor_s = design == Design::kAware ? 0.10 : 0.0;
+  c.smoother_s = 0.01;
+  c.sensor_volume_max_m3 = 36e3;
+  return c;
+}
+
+SpaceProfile open_space(double visible_m, double speed_mps) {
+  SpaceProfile p;
+  p.gap_average_m = kInfinity;
+  p.gap_min_m = kInfinity;
+  p.closest_obstacle_m = kInfinity;
+  p.closest_unknown_m = visible_m;
+  p.sensor_volume_m3 = 30e3;
+  p.map_volume_m3 = 60e3;
+  p.speed_mps = speed_mps;
+  return p;
+}
+
+TEST(Governor, StageBudgetsNeverExceedTheDeadline) {
+  Governor sut(paper_config(Design::kAware));
+  core::CounterRng rng(1);
+  int feasible = 0;
+  for (int i = 0; i < 5000; ++i) {
+    SpaceProfile p = open_space(rng.uniform(0.0, 25.0), rng.uniform(0.0, 6.0));
+    p.gap_average_m = rng.uniform(1.0, 20.0);
+    p.closest_obstacle_m = rng.uniform(0.3, 20.0);
+    p.sensor_volume_m3 = rng.uniform(0.0, 40e3);
+    p.map_volume_m3 = rng.uniform(0.0, 1e6);
+    const Decision d = sut.decide(p, {static_cast<int>(rng.below(6)), rng.uniform(0.0, 100.0)});
+    double total_s = 0.0;
+    for (const double s : d.predicted_s) total_s += s;
+    ASSERT_LE(total_s, seconds(d.point.deadline) + 1e-9);
+    ASSERT_GE(d.point.p1_level, d.point.p0_level);
+    ASSERT_GE(d.point.speed_limit_mps, 0.5);
+    ASSERT_LE(d.point.speed_limit_mps, 6.0);
+    ASSERT_EQ(d.point.deadline.count() % 2'500'000, 0) << "whole minor frames";
+    feasible += d.solution.status == Status::kOk ? 1 : 0;
+  }
+  EXPECT_GT(feasible, 1000) << "otherwise nothing was tested";
+}
+
+TEST(Governor, SpeedLimitGrowsWithVisibilityAndFallsWithLatency) {
+  const Governor sut(paper_config(Design::kAware));
+  double last = -1.0;
+  for (double d = 0.0; d <= 25.0; d += 0.5) {
+    const double v = sut.safe_speed_mps(d, 1.0);
+    EXPECT_GE(v, last);
+    last = v;
+    if (v > 0.0) {
+      // By definition (d - d_stop(v)) / (2 v) = latency there.
+      EXPECT_NEAR((d - kSitlQuadrotorStopping.distance_m(v)) / (2.0 * v), 1.0, 1e-6);
+    }
+    EXPECT_LE(sut.safe_speed_mps(d, 2.0), v);
+  }
+  EXPECT_EQ(sut.safe_speed_mps(kNan, 1.0), 0.0);
+}
+
+TEST(Governor, StaticFairFliesAsFastAsItsOwnWorstCaseAllows) {
+  const Governor fair(paper_config(Design::kStaticFair));
+  // L = 0.38 + (0.25 + 3.6 * 1.26) + (0.25 + 1.11) + 3.6 * 0.37 = 7.86 s; (10 - d_stop(v)) / (2 v) = 7.86 gives 0.61 m/s.
+  EXPECT_NEAR(fair.v_max_mps(), 0.61, 0.02);
+  EXPECT_EQ(Governor(paper_config(Design::kStatic)).v_max_mps(), 0.5);
+}
+
+TEST(Governor, StaticKnobsAreThePublishedOnes) {
+  Governor sut(paper_config(Design::kStatic));
+  const Decision d = sut.decide(open_space(25.0, 0.5), {});
+  EXPECT_EQ(d.point.p0_level, 0);
+  EXPECT_EQ(d.point.p1_level, 0);
+  EXPECT_EQ(d.point.v0_m3, 46e3);
+  EXPECT_EQ(d.point.v1_m3, 150e3);
+  EXPECT_EQ(d.point.v2_m3, 150e3);
+  EXPECT_EQ(d.predicted_s[static_cast<std::size_t>(core::StageId::kGovernor)], 0.0) << "it has none";
+}
+
+TEST(Governor, LooksFinerWhereObstaclesAreNear) {
+  Governor sut(paper_config(Design::kAware));
+  SpaceProfile p = open_space(25.0, 0.0);
+  for (int i = 0; i < 4; ++i) (void)sut.decide(p, {0, 100.0});
+  const int coarse = sut.decide(p, {0, 100.0}).point.p1_level;
+  p.closest_obstacle_m = 0.7;
+  EXPECT_LT(sut.decide(p, {0, 100.0}).point.p0_level, coarse);
+}
+
+TEST(Governor, LosesPrecisionOneLevelADecision) {
+  Governor sut(paper_config(Design::kAware));
+  SpaceProfile p = open_space(25.0, 0.0);
+  p.closest_obstacle_m = 0.5;
+  int last = sut.decide(p, {0, 100.0}).point.p0_level;
+  p.closest_obstacle_m = kInfinity;
+  for (int i = 0; i < 6; ++i) {
+    const int level = sut.decide(p, {0, 100.0}).point.p0_level;
+    EXPECT_LE(level, last + 1);
+    last = level;
+  }
+  EXPECT_GE(last, 2);
+}
+
+TEST(Governor, TimeWinsOverPrecisionAtSpeed) {
+  Governor sut(paper_config(Design::kAware));
+  SpaceProfile p = open_space(8.0, 6.0);
+  p.closest_obstacle_m = 0.7;  // asks for 0.3 m, which takes 4 s
+  const Decision d = sut.decide(p, {0, 100.0});
+  EXPECT_LT(seconds(d.point.deadline), 1.0);
+}
+
+TEST(Governor, EveryInputHasAnAnswer) {
+  Governor sut(paper_config(Design::kAware));
+  SpaceProfile p = open_space(kNan, kNan);
+  p.gap_average_m = kNan;
+  p.closest_obstacle_m = kNan;
+  p.sensor_volume_m3 = kNan;
+  p.map_volume_m3 = kNan;
+  p.outlook[0] = {kNan, kNan, kNan};
+  p.outlook_count = 1;
+  const Decision d = sut.decide(p, {0, kNan});
+  EXPECT_GT(d.point.deadline.count(), 0);
+  EXPECT_TRUE(std::isfinite(d.point.speed_limit_mps));
+}
+
+TEST(Governor, DecideDoesNotAllocate) {
+  Governor sut(paper_config(Design::kAware));
+  const SpaceProfile p = open_space(20.0, 3.0);
+  const test::NoAllocScope scope;
+  (void)sut.decide(p, {1, 50.0});
+  EXPECT_EQ(scope.count(), 0U);
+}
+
+}  // namespace
+}  // namespace roborun::governor

@@ -1,0 +1,34 @@
+/// A map view made of boxes, for tests of planners: free inside `free_W`, occupied inside `occupied`, unknown elsewhere.
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+#include "stages/perception/map_view.hpp"
+
+namespace roborun::test {
+
+class BoxView final : public stages::MapView {
+ public:
+  Aabb free_W{};
+  std::vector<Aabb> occupied;
+
+  [[nodiscard]] bool is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
+    ++lookups;
+    if (!(box_W.min_W.array() <= box_W.max_W.array()).all() || !free_W.contains(box_W.min_W) || !free_W.contains(box_W.max_W)) return false;
+    for (const Aabb& o : occupied) {
+      if ((box_W.min_W.array() <= o.max_W.array()).all() && (box_W.max_W.array() >= o.min_W.array()).all()) return false;
+    }
+    return true;
+  }
+  [[nodiscard]] stages::CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept override {
+    ++lookups;
+    for (const Aabb& o : occupied) {
+      if (o.contains(p_W)) return stages::CellState::kOccupied;
+    }
+    return free_W.contains(p_W) ? stages::CellState::kFree : stages::CellState::kUnknown;
+  }
+  [[nodiscard]] double cell_m() const noexcept override { return 0.3; }
+};
+
+}  // namespace roborun::test
