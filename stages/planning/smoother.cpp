@@ -16,6 +16,7 @@ using Block = Eigen::Matrix<double, 4, 3>;
 
 constexpr double kSameWaypoint_m = 0.25;
 constexpr double kMinSegment_s = 0.15;
+constexpr double kCruisePiece_m = 5.0;
 constexpr double kProfileShare =
     0.60;  // of the acceleration limit: the curve around the profile needs the rest
 constexpr double kCornerCut_m = 0.3;  // how far a corner may be cut: the planner leaves about so much room
@@ -111,8 +112,16 @@ bool Smoother::allocate(std::span<const Vector3> path_W, const TrajectoryPoint& 
     if (up_m > 1.5 && cruise_m + down_m > 1.5) {
       if (!add(path_W[i] + way * (up_m / length_m), up_s)) return false;
       pending_s = 0.0;
+      // Long cruises are held by way-points: a single polynomial would sag between its ends.
+      const int pieces = std::min(static_cast<int>(cruise_m / kCruisePiece_m), 6);
+      for (int k = 1; k <= pieces; ++k) {
+        const double share = static_cast<double>(k) / (pieces + 1);
+        if (!add(path_W[i] + way * ((up_m + share * cruise_m) / length_m), cruise_s / (pieces + 1))) return false;
+      }
+      pending_s += cruise_s / (pieces + 1);
+    } else {
+      pending_s += cruise_s;
     }
-    pending_s += cruise_s;
     if (down_m > (last ? 0.3 : 1.5) && cruise_m + up_m > 1.0 && (pending_s > kMinSegment_s)) {
       if (cruise_m > 0.3 || pending_s > cruise_s) {
         if (!add(path_W[i] + way * ((up_m + cruise_m) / length_m), pending_s)) return false;

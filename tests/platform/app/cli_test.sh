@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# Bad input gets one line on stderr that says what would be right, nothing on stdout, and exit code 2.
+set -u
+roborun=$1
+data=$2
+failed=0
+passed=0
+refuses() {
+  local wanted=$1 out err code
+  shift
+  out=$("$roborun" "$@" 2>/tmp/roborun_cli_test.$$)
+  code=$?
+  err=$(cat /tmp/roborun_cli_test.$$)
+  if [[ $code -ne 2 || -n "$out" || $(wc -l <<<"$err") -ne 1 || "$err" != *"$wanted"* ]]; then
+    echo "FAILED [$code] roborun $*: '$err' does not say '$wanted' in one line with exit code 2"
+    failed=$((failed + 1))
+  else
+    passed=$((passed + 1))
+  fi
+}
+refuses "1 .. 27" fly --env 99
+refuses "1 .. 27" fly --env ""
+refuses "aware, static, static-fair" fly --design foo
+refuses "aware, static, static-fair" fly --design aware,,static
+refuses "paper or host" fly --profile x
+refuses "whole number" fly --seed -1
+refuses "whole number" fly --seed 1x
+refuses "own or octomap" fly --map foo
+refuses "ompl:RRTstar" fly --planner ompl:Foo
+refuses "speed or precision" fly --color red
+refuses "package_delivery or search_and_rescue" fly --mission x
+refuses "cannot be opened" fly --world nope.toml
+refuses "must end in .toml, .bt or .ot" fly --world nope.xyz
+refuses "X,Y,Z" fly --world "$data/worlds/two_pillars.toml" --start 1,2
+refuses "cannot be opened" fly --settings nope.toml
+refuses "--nope" fly --nope
+refuses "subcommand" 
+printf '[world]\nbounds = [[0,0,0],[9,9,9]]\nstart = [1,1,1]\ngoal = [5,5,5]\nwalls = 3\n' >/tmp/roborun_bad.$$.toml
+refuses ":5: walls: unknown key" fly --world /tmp/roborun_bad.$$.toml
+printf '[camera]\npixels = 9999\n' >/tmp/roborun_bad.$$.toml
+refuses ":2: pixels: must be a number from 8 to 512" fly --settings /tmp/roborun_bad.$$.toml
+rm -f /tmp/roborun_cli_test.$$ /tmp/roborun_bad.$$.toml
+echo "$passed passed, $failed failed"
+[[ $failed -eq 0 && $passed -gt 15 ]]

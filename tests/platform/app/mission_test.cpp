@@ -1,0 +1,66 @@
+#include "platform/app/mission.hpp"
+
+#include <gtest/gtest.h>
+
+#include "platform/app/host_profile.hpp"
+#include "platform/sitl/world/generator.hpp"
+#include "platform/sitl/world/world_file.hpp"
+
+namespace roborun::app {
+namespace {
+
+MissionConfig paper_mission(governor::Design design, std::uint64_t seed) {
+  const Profile profile = paper();
+  MissionConfig config;
+  config.design = design;
+  config.costs = profile.costs;
+  config.model = profile.model;
+  config.seed = seed;
+  return config;
+}
+
+TEST(Mission, FliesTheMiddleEnvironmentWithoutACollisionAndRepeats) {
+  const sitl::World world = sitl::generate(sitl::environment("14").knobs, sitl::Mission::kPackageDelivery, 1);
+  const MissionConfig config = paper_mission(governor::Design::kAware, 1);
+  const report::MissionReport first = fly_mission(world, config, {});
+  EXPECT_TRUE(first.result.reached_goal) << first.result.reason;
+  EXPECT_FALSE(first.result.collided);
+  EXPECT_GT(first.result.mean_velocity_mps, 2.0);
+  EXPECT_LE(first.result.max_velocity_mps, 6.0 * 1.15);
+  EXPECT_GT(first.result.decisions, 100U);
+  EXPECT_EQ(fly_mission(world, config, {}).result.state_hash, first.result.state_hash);
+}
+
+TEST(Mission, EveryDesignFliesPastTwoPillars) {
+  const sitl::World world = sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {});
+  for (const auto design : {governor::Design::kAware, governor::Design::kStatic, governor::Design::kStaticFair}) {
+    const report::MissionReport report = fly_mission(world, paper_mission(design, 1), {});
+    EXPECT_TRUE(report.result.reached_goal) << report.result.design << ": " << report.result.reason;
+    EXPECT_FALSE(report.result.collided);
+    EXPECT_NE(report.result.state_hash, std::string(16, '0'));
+  }
+}
+
+TEST(Mission, EveryBackendFlies) {
+  const sitl::World world = sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {});
+  for (const auto& [map, planner] : {std::pair{"octomap", "own"}, std::pair{"own", "ompl:RRTstar"}}) {
+    MissionConfig config = paper_mission(governor::Design::kAware, 1);
+    config.map_backend = map;
+    config.planner_backend = planner;
+    const report::MissionReport report = fly_mission(world, config, {});
+    EXPECT_TRUE(report.result.reached_goal) << map << " " << planner << ": " << report.result.reason;
+    EXPECT_FALSE(report.result.collided);
+  }
+}
+
+TEST(Mission, EndsSafelyWithANamedReasonWhereTheGoalIsWalledIn) {
+  const sitl::World world = sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/walled_goal.toml", {});
+  const report::MissionReport report = fly_mission(world, paper_mission(governor::Design::kAware, 1), {});
+  EXPECT_FALSE(report.result.reached_goal);
+  EXPECT_FALSE(report.result.collided);
+  EXPECT_EQ(report.result.reason, "no_path_to_goal");
+  EXPECT_LT(report.path.back().speed_mps, 0.5) << "hovering";
+}
+
+}  // namespace
+}  // namespace roborun::app

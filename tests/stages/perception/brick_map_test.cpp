@@ -1,0 +1,280 @@
+#include "stages/perception/brick_map.hpp"
+
+#include <gtest/gtest.h>
+
+#include "core/random/counter_rng.hpp"
+#include "stages/perception/point_cloud.hpp"
+#include "stages/perception/space_profiler.hpp"
+#include "tests/stages/perception/scene.hpp"
+#include "tests/support/no_alloc_scope.hpp"
+
+namespace roborun::stages {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+TEST(Brick, MipsSayWhatTheCellsSay) {
+  core::CounterRng rng(1);
+  auto sut = std::make_unique<Brick>();
+  sut->clear(0, 0, 0);
+  for (std::int8_t& c : sut->cell) {
+    const auto kind = rng.below(20);
+    c = kind == 0 ? evidence::kUnknown : (kind == 1 ? evidence::kHit : evidence::kFree);
+  }
+  sut->refresh();
+  for (int level = 1; level <= kBrickLevel; ++level) {
+    const std::size_t size = std::size_t{1} << (3 * level);
+    for (std::uint32_t m = 0; m < kCellsPerBrick / size; ++m) {
+      std::uint8_t expected = 0;
+      for (std::size_t i = m * size; i < (m + 1) * size; ++i) expected = static_cast<std::uint8_t>(expected | sut->flags(0, static_cast<std::uint32_t>(i)));
+      ASSERT_EQ(sut->flags(level, m), expected) << level << " " << m;
+    }
+  }
+}
+
+TEST(Brick, EvidenceIsBounded) {
+  std::int8_t cell = evidence::kUnknown;
+  cell = evidence::after_miss(cell);
+  EXPECT_EQ(cell, evidence::kFree);
+  cell = evidence::after_hit(cell);
+  EXPECT_GT(cell, 0) << "one surface is enough";
+  for (int i = 0; i < 100; ++i) cell = evidence::after_hit(cell);
+  int misses = 0;
+  while (cell > 0) {
+    cell = evidence::after_miss(cell);
+    ++misses;
+  }
+  EXPECT_LE(misses, 10);
+}
+
+TEST(Morton, InterleavesThreeAxes) {
+  EXPECT_EQ(morton3(1, 0, 0), 1U);
+  EXPECT_EQ(morton3(0, 1, 0), 2U);
+  EXPECT_EQ(morton3(0, 0, 1), 4U);
+  EXPECT_EQ(morton3(15, 15, 15), 4095U);
+}
+
+class BrickMapTest : public ::testing::Test {
+ protected:
+  explicit BrickMapTest(std::size_t max_bricks = 2000) : block_(64U << 20U), arena_(block_) {
+    config_.bounds_W = {Vector3(-30, -30, -3), Vector3(30, 30, 12)};
+    config_.max_bricks = max_bricks;
+    config_.max_image_side = 64;
+    sut_ = std::make_unique<BrickMap>(config_, arena_);
+    scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)}, {Vector3(6, -2, 0), Vector3(8, 2, 12)}, {Vector3(-9, 4, 0), Vector3(-7, 6, 12)}};
+  }
+  std::vector<std::byte> block_;
+  core::Arena arena_;
+  BrickMap::Config config_;
+  std::unique_ptr<BrickMap> sut_;
+  test::Scene scene_;
+  const Vector3 at_{0.1, 0.2, 5.0};
+  core::UnlimitedBudget unlimited_;
+  IntegrationResult result_;
+};
+
+TEST_F(BrickMapTest, BoxesAgreeWithTheirCellsAtEveryPrecision) {
+  const std::array<Vector3, 1> here{at_};
+  ASSERT_EQ(sut_->integrate({scene_.look(at_), 0, kInfinity, here}, unlimited_, result_), Status::kOk);
+  core::CounterRng rng(2);
+  int free_boxes = 0;
+  for (int level = 0; level < kPrecisionLevels; ++level) {
+    core::Work work;
+    (void)sut_->export_view({level, kInfinity, at_}, unlimited_, work);
+    const MapView& view = sut_->view();
+    std::uint64_t lookups = 0;
+    for (int n = 0; n < 2000; ++n) {
+      const Vector3 c(rng.uniform(-14, 14), rng.uniform(-14, 14), rng.uniform(1, 9));
+      const double half = rng.uniform(0.05, 1.5);
+      // Brute force over points no farther apart than a third of the finest cell.
+      bool expected = true;
+      for (double x = -half; expected && x <= half + 1e-9; x += half / std::ceil(half / 0.1)) {
+        for (double y = -half; expected && y <= half + 1e-9; y += half / std::ceil(half / 0.1)) {
+          for (double z = -half; expected && z <= half + 1e-9; z += half / std::ceil(half / 0.1)) {
+            expected = view.at(c + Vector3(x, y, z), lookups) == CellState::kFree;
+          }
+        }
+      }
+      const bool actual = view.is_free(Aabb::around(c, half), lookups);
+      ASSERT_TRUE(!actual || expected) << "a box is free only if all its points are, level " << level;
+      free_boxes += actual ? 1 : 0;
+      if (level == 0) {
+        ASSERT_EQ(actual, expected);
+      }
+    }
+  }
+  EXPECT_GT(free_boxes, 500);
+}
+
+TEST_F(BrickMapTest, CoarseScansLeaveUnknownWhatFineOnesClear) {
+  const std::array<Vector3, 1> here{at_};
+  double last_m3 = 1e18;
+  for (int level = 0; level < 5; ++level) {
+    std::vector<std::byte> block(64U << 20U);
+    core::Arena arena(block);
+    BrickMap map(config_, arena);
+    ASSERT_EQ(map.integrate({scene_.look(at_), level, kInfinity, here}, unlimited_, result_), Status::kOk);
+    EXPECT_LE(result_.work.volume_m3, last_m3 * 1.0001) << level;
+    last_m3 = result_.work.volume_m3;
+  }
+  EXPECT_GT(last_m3, 100.0);
+}
+
+TEST_F(BrickMapTest, ACoarseLookNeverClearsAFineSurface) {
+  const std::array<Vector3, 1> here{at_};
+  const auto frames = scene_.look(at_);
+  (void)sut_->integrate({frames, 0, kInfinity, here}, unlimited_, result_);
+  core::Work work;
+  (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
+  std::uint64_t lookups = 0;
+  std::vector<Vector3> surface;
+  for (double y = -1.95; y < 2; y += 0.3) {
+    for (const double x : {5.85, 6.15}) {
+      if (sut_->view().at(Vector3(x, y, 5.05), lookups) == CellState::kOccupied) surface.emplace_back(x, y, 5.05);
+    }
+  }
+  ASSERT_GT(surface.size(), 5U);
+  for (int i = 0; i < 20; ++i) (void)sut_->integrate({frames, 2 + i % 3, kInfinity, here}, unlimited_, result_);
+  (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
+  for (const Vector3& p : surface) EXPECT_EQ(sut_->view().at(p, lookups), CellState::kOccupied) << p.transpose();
+}
+
+class SmallBrickMap : public BrickMapTest {
+ protected:
+  SmallBrickMap() : BrickMapTest(64) {}
+};
+
+TEST_F(SmallBrickMap, GivesUpTheFarthestBricksWhenFull) {
+  for (double x = -20; x <= 20; x += 5) {
+    const Vector3 p(x, 10, 5);
+    const std::array<Vector3, 1> here{p};
+    (void)sut_->integrate({scene_.look(p), 0, kInfinity, here}, unlimited_, result_);
+  }
+  EXPECT_GT(sut_->counters().bricks_given_up + sut_->counters().bricks_refused, 0U);
+  EXPECT_LE(sut_->known_volume_m3(), 64 * 4.8 * 4.8 * 4.8 + 1e-6);
+  core::Work work;
+  (void)sut_->export_view({0, kInfinity, Vector3(20, 10, 5)}, unlimited_, work);
+  std::uint64_t lookups = 0;
+  EXPECT_TRUE(sut_->view().is_free(Aabb::around(Vector3(20, 10, 5), 0.2), lookups)) << "what is near stays";
+}
+
+TEST_F(BrickMapTest, WorksWithoutTheHeap) {
+  const auto frames = scene_.look(at_);
+  const std::array<Vector3, 1> here{at_};
+  core::Work work;
+  const test::NoAllocScope scope;
+  (void)sut_->integrate({frames, 0, kInfinity, here}, unlimited_, result_);
+  (void)sut_->export_view({1, 20e3, at_}, unlimited_, work);
+  std::uint64_t lookups = 0;
+  (void)sut_->view().is_free(Aabb::around(at_, 0.9), lookups);
+  EXPECT_EQ(scope.count(), 0U);
+}
+
+TEST_F(BrickMapTest, StopsWhenTheBudgetIsSpent) {
+  class Short final : public core::StageBudget {
+   public:
+    [[nodiscard]] bool spent(const core::Work& done) noexcept override { return done.units > 2000; }
+  } budget;
+  const std::array<Vector3, 1> here{at_};
+  EXPECT_EQ(sut_->integrate({scene_.look(at_), 0, kInfinity, here}, budget, result_), Status::kBudgetSpent);
+  EXPECT_LT(result_.work.units, 2000U + 1024U + 6U * 64U * 64U);
+}
+
+TEST_F(BrickMapTest, AViewIsUnknownBeyondItsVolume) {
+  const std::array<Vector3, 1> here{at_};
+  (void)sut_->integrate({scene_.look(at_), 0, kInfinity, here}, unlimited_, result_);
+  core::Work work;
+  EXPECT_EQ(sut_->export_view({0, 1000.0, at_}, unlimited_, work), Status::kBudgetSpent);
+  EXPECT_LE(work.volume_m3, 1500.0);
+  std::uint64_t lookups = 0;
+  EXPECT_EQ(sut_->view().at(at_, lookups), CellState::kFree);
+  EXPECT_EQ(sut_->view().at(Vector3(-15, -10, 5), lookups), CellState::kUnknown);
+}
+
+TEST_F(BrickMapTest, FreeDistanceEndsAtThePillar) {
+  const std::array<Vector3, 1> here{at_};
+  (void)sut_->integrate({scene_.look(at_), 0, kInfinity, here}, unlimited_, result_);
+  core::Work work;
+  (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
+  std::uint64_t lookups = 0;
+  const double free_m = free_distance_m(sut_->view(), at_, Vector3(1, 0, 0), 0.6, 20.0, lookups);
+  EXPECT_LT(free_m, 6.0 - 0.1 - 0.6 + 0.01);
+  EXPECT_GT(free_m, 6.0 - 0.1 - 0.6 - 0.9);
+  EXPECT_EQ(free_distance_m(sut_->view(), at_, Vector3(0, 0, 0), 0.6, 20.0, lookups), 0.0);
+  EXPECT_EQ(free_distance_m(sut_->view(), at_, Vector3(std::nan(""), 0, 0), 0.6, 20.0, lookups), 0.0);
+  EXPECT_FALSE(is_segment_free(sut_->view(), at_, Vector3(10, 0, 5), 0.6, lookups));
+  EXPECT_TRUE(is_segment_free(sut_->view(), at_, Vector3(4, 0, 5), 0.6, lookups));
+}
+
+TEST_F(BrickMapTest, PointCloudAveragesAndProfilesGaps) {
+  std::vector<std::byte> block(32U << 20U);
+  core::Arena arena(block);
+  PointCloud cloud({}, arena);
+  ASSERT_FALSE(arena.exhausted());
+  core::Work work;
+  const auto frames = scene_.look(at_);
+  ASSERT_EQ(cloud.step(frames, 0, unlimited_, work), Status::kOk);
+  const std::size_t fine = cloud.points().size();
+  for (const CloudPoint& p : cloud.points()) {
+    double nearest = 1e9;
+    for (const Aabb& b : scene_.solid) nearest = std::min(nearest, (p.p_W - p.p_W.cwiseMax(b.min_W).cwiseMin(b.max_W)).norm());
+    ASSERT_LT(nearest, 0.3);
+  }
+  // The sphere of sight of 20 m, cut at the floor: between a half ball of 5 m and the box of 40 x 40 x 25 m.
+  EXPECT_GT(cloud.seen_volume_m3(), 5000.0);
+  EXPECT_LT(cloud.seen_volume_m3(), 40e3);
+  (void)cloud.step(frames, 3, unlimited_, work);
+  EXPECT_LT(cloud.points().size(), fine / 4);
+  const std::vector<PosedDepthFrame> none;
+  EXPECT_EQ(cloud.step(none, 0, unlimited_, work), Status::kInvalidArgument);
+
+  (void)cloud.step(frames, 0, unlimited_, work);
+  const std::array<Vector3, 1> here{at_};
+  (void)sut_->integrate({frames, 0, kInfinity, here}, unlimited_, result_);
+  (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
+  SpaceProfile profile;
+  std::uint64_t lookups = 0;
+  profile_space({}, cloud.points(), sut_->view(), Trajectory::hold(at_, {}), {}, at_, Vector3::Zero(), Vector3(20, 0, 5),
+                {Vector3(-30, -30, 1), Vector3(30, 30, 12)}, 0.6, profile, lookups);
+  EXPECT_NEAR(profile.closest_obstacle_m, 5.9, 0.2) << "the front of the nearer pillar";
+  // The gap between the corners (6, 2) and (-7, 4): 13.2 m; the other way round is wider than 20 m or between the same.
+  EXPECT_GT(profile.gap_average_m, 10.0);
+  EXPECT_LT(profile.gap_average_m, 20.0);
+  EXPECT_LT(profile.closest_unknown_m, 6.0);
+  EXPECT_EQ(profile.outlook_count, 1U);
+}
+
+TEST(DepthPyramid, BoundsEveryRectangle) {
+  core::CounterRng rng(3);
+  std::vector<float> depth(96 * 80);
+  for (float& d : depth) d = static_cast<float>(rng.uniform(0.5, 30.0));
+  for (int i = 0; i < 50; ++i) depth[rng.below(depth.size())] = std::numeric_limits<float>::quiet_NaN();
+  firmware_if::DepthFrame frame;
+  frame.width = 96;
+  frame.height = 80;
+  frame.tan_half_fov_ratio = 1.0F;
+  frame.range_m = 25.0F;
+  frame.depth_m = depth;
+  std::vector<std::byte> block(1U << 20U);
+  core::Arena arena(block);
+  DepthPyramid sut(arena, 96);
+  ASSERT_EQ(sut.build(frame), Status::kOk);
+  for (int n = 0; n < 2000; ++n) {
+    const int u0 = static_cast<int>(rng.below(96)), v0 = static_cast<int>(rng.below(80));
+    const int u1 = std::min(95, u0 + static_cast<int>(rng.below(40))), v1 = std::min(79, v0 + static_cast<int>(rng.below(40)));
+    const DepthPyramid::Bound bound = sut.bound(u0, v0, u1, v1);
+    for (int v = v0; v <= v1; ++v) {
+      for (int u = u0; u <= u1; ++u) {
+        const float d = depth[static_cast<std::size_t>(v * 96 + u)];
+        if (!(d > 0.0F)) continue;
+        ASSERT_LE(bound.least_m, std::min(d, 25.0F));
+        ASSERT_GE(bound.most_m, std::min(d, 25.0F));
+      }
+    }
+  }
+  frame.width = 97;
+  EXPECT_EQ(sut.build(frame), Status::kCapacity);
+}
+
+}  // namespace
+}  // namespace roborun::stages
