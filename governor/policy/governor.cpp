@@ -208,8 +208,7 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
     fill_prediction(d);
     double total_s = 0.0;
     for (const double stage_s : d.predicted_s) total_s += stage_s;
-    deadline_s =
-        std::max(deadline_s, total_s * (1.0 + policy.reserve_ratio) + seconds(config_.minor_frame));
+    deadline_s = std::max(deadline_s, total_s * (1.0 + policy.reserve_ratio) + seconds(config_.minor_frame));
   }
 
   // 4. How fast may the next trajectory be?

@@ -23,6 +23,7 @@ namespace {
 constexpr Nanos kMinorFrame{2'500'000};
 constexpr double kReached_m = 1.0;
 constexpr double kReachedSpeed_mps = 0.5;
+constexpr double kHover_mps = 0.3;
 constexpr double kMapMargin_m = 3.0;
 constexpr double kTakeOff_mps = 1.5;
 
@@ -84,6 +85,7 @@ class MissionRun {
   std::optional<DecisionOutput> pending_;  ///< Computed, not yet there in virtual time.
   MonotonicTime pending_at_{};
   MonotonicTime next_decision_{};
+  const char* give_up_{nullptr};  ///< Why the vehicle stops where it is.
   double best_distance_m_{1e300};
   MonotonicTime best_at_{};
   std::uint64_t decision_count_{0};
@@ -146,8 +148,8 @@ void MissionRun::step_world() {
 
 void MissionRun::start_decision() {
   stages::EstimatedState state;
-  if (now_ < next_decision_ || pending_ || flight_.estimator().state(state) != Status::kOk ||
-      !flight_.airborne())
+  if (give_up_ != nullptr || now_ < next_decision_ || pending_ ||
+      flight_.estimator().state(state) != Status::kOk || !flight_.airborne())
     return;
   core::StaticVector<stages::PosedDepthFrame, 8> frames;
   for (sitl::SimulatedDepthCamera& camera : cameras_) {
@@ -245,9 +247,16 @@ const char* MissionRun::end_reason() {
     best_at_ = now_;
   }
   if (s.battery_ratio <= 0.0) return "battery_empty";
-  if (seconds(now_ - best_at_) > config_.no_progress_s) return "no_path_to_goal";
-  if (seconds(now_.time_since_epoch()) > config_.time_limit_s) return "time_limit";
-  return nullptr;
+  if (give_up_ == nullptr) {
+    if (seconds(now_ - best_at_) > config_.no_progress_s) give_up_ = "no_path_to_goal";
+    if (seconds(now_.time_since_epoch()) > config_.time_limit_s) give_up_ = "time_limit";
+    return nullptr;
+  }
+  // Given up: no more decisions; the committed trajectory ends in a stop, and the mission in a hover.
+  const Trajectory& committed = flight_.committed();
+  const bool stopped =
+      now_ > committed.start_time + from_seconds(committed.duration_s()) && s.v_WB.norm() < kHover_mps;
+  return stopped ? give_up_ : nullptr;
 }
 
 void MissionRun::summarise(double wall_s) {

@@ -116,7 +116,8 @@ bool Smoother::allocate(std::span<const Vector3> path_W, const TrajectoryPoint& 
       const int pieces = std::min(static_cast<int>(cruise_m / kCruisePiece_m), 6);
       for (int k = 1; k <= pieces; ++k) {
         const double share = static_cast<double>(k) / (pieces + 1);
-        if (!add(path_W[i] + way * ((up_m + share * cruise_m) / length_m), cruise_s / (pieces + 1))) return false;
+        if (!add(path_W[i] + way * ((up_m + share * cruise_m) / length_m), cruise_s / (pieces + 1)))
+          return false;
       }
       pending_s += cruise_s / (pieces + 1);
     } else {

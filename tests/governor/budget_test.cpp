@@ -1,5 +1,3 @@
-#include "governor/budget/time_budget.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 #include <limits>
 
 #include "core/random/counter_rng.hpp"
+#include "governor/budget/time_budget.hpp"
 
 namespace roborun::governor {
 namespace {
@@ -59,7 +58,8 @@ TEST(TimeBudget, NeverGrowsWithSpeedNorShrinksWithVisibility) {
   }
 }
 
-/// Algorithm 1 in steps of 1 ms: the remaining budget runs down with time and is never more than Eq. 1 allows.
+/// Algorithm 1 in steps of 1 ms: the remaining budget runs down with time and is never more than Eq. 1
+/// allows.
 double dense_reference_s(std::span<const TrajectoryOutlook> w) {
   constexpr double kStep_s = 1e-3;
   double remaining_s = 15.0;
@@ -72,7 +72,8 @@ double dense_reference_s(std::span<const TrajectoryOutlook> w) {
       here.visible_m = w[i].visible_m + share * (w[i + 1].visible_m - w[i].visible_m);
     }
     const double rest_m = here.visible_m - kRoborunStopping.distance_m(here.speed_mps);
-    const double local_s = here.speed_mps <= 0.0 ? (rest_m > 0.0 ? 15.0 : 0.0) : std::clamp(rest_m / here.speed_mps, 0.0, 15.0);
+    const double local_s =
+        here.speed_mps <= 0.0 ? (rest_m > 0.0 ? 15.0 : 0.0) : std::clamp(rest_m / here.speed_mps, 0.0, 15.0);
     remaining_s = std::min(remaining_s, local_s);
     if (remaining_s <= 0.0) return t;
     remaining_s -= kStep_s;
@@ -104,10 +105,11 @@ TEST(TrajectoryBudget, IsNeverMoreOptimisticThanADenseReference) {
 }
 
 TEST(TrajectoryBudget, CountsPartOfTheFirstSegment) {
-  // One long segment at constant speed 4 m/s: Eq. 1 at its start gives (10 - 2.095) / 4 = 1.976 s, less than the segment's 5 s.
-  // Whole segments only (as printed) would give 0.
+  // One long segment at constant speed 4 m/s: Eq. 1 at its start gives (10 - 2.095) / 4 = 1.976 s, less than
+  // the segment's 5 s. Whole segments only (as printed) would give 0.
   const std::array<TrajectoryOutlook, 2> w{{{0.0, 4.0, 10.0}, {5.0, 4.0, 10.0}}};
-  EXPECT_NEAR(seconds(trajectory_budget(w, kRoborunStopping, kLimits)), (10.0 - kRoborunStopping.distance_m(4.0)) / 4.0, 1e-6);
+  EXPECT_NEAR(seconds(trajectory_budget(w, kRoborunStopping, kLimits)),
+              (10.0 - kRoborunStopping.distance_m(4.0)) / 4.0, 1e-6);
 }
 
 TEST(TrajectoryBudget, RefusesToGuess) {

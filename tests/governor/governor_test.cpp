@@ -18,7 +18,8 @@ GovernorConfig paper_config(Design design) {
   static const core::CostProfile costs = core::paper_profile();
   GovernorConfig c;
   c.design = design;
-  c.model = {from_cost(costs.of(core::StageId::kMap)), from_cost(costs.of(core::StageId::kExport)), from_cost(costs.of(core::StageId::kPlanner))};
+  c.model = {from_cost(costs.of(core::StageId::kMap)), from_cost(costs.of(core::StageId::kExport)),
+             from_cost(costs.of(core::StageId::kPlanner))};
   c.point_cloud_s = 0.37;
   c.governor_s = design == Design::kAware ? 0.10 : 0.0;
   c.smoother_s = 0.01;
@@ -79,7 +80,8 @@ TEST(Governor, SpeedLimitGrowsWithVisibilityAndFallsWithLatency) {
 
 TEST(Governor, StaticFairFliesAsFastAsItsOwnWorstCaseAllows) {
   const Governor fair(paper_config(Design::kStaticFair));
-  // L = 0.38 + (0.25 + 3.6 * 1.26) + (0.25 + 1.11) + 3.6 * 0.37 = 7.86 s; (10 - d_stop(v)) / (2 v) = 7.86 gives 0.61 m/s.
+  // L = 0.38 + (0.25 + 3.6 * 1.26) + (0.25 + 1.11) + 3.6 * 0.37 = 7.86 s; (10 - d_stop(v)) / (2 v) = 7.86
+  // gives 0.61 m/s.
   EXPECT_NEAR(fair.v_max_mps(), 0.61, 0.02);
   EXPECT_EQ(Governor(paper_config(Design::kStatic)).v_max_mps(), 0.5);
 }

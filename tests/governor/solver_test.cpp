@@ -1,5 +1,3 @@
-#include "governor/solver/lattice_solver.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <vector>
 
 #include "core/random/counter_rng.hpp"
+#include "governor/solver/lattice_solver.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::governor {
@@ -49,8 +48,10 @@ double exhaustive(const SolverProblem& p) {
             const double v0 = v0_max * i / 10.0;
             const double v1 = v0 + (v1_max - v0) * k / 10.0;
             const double v2 = p.v2_max_m3 * n / 10.0;
-            const double latency = p.model[0].latency_s(p0, v0) + p.model[1].latency_s(p1, v1) + p.model[2].latency_s(p1, v2);
-            if (latency <= p.delta_d_s) best = std::min(best, (p.delta_d_s - latency) * (p.delta_d_s - latency));
+            const double latency =
+                p.model[0].latency_s(p0, v0) + p.model[1].latency_s(p1, v1) + p.model[2].latency_s(p1, v2);
+            if (latency <= p.delta_d_s)
+              best = std::min(best, (p.delta_d_s - latency) * (p.delta_d_s - latency));
           }
         }
       }
@@ -105,7 +106,8 @@ TEST(LatticeSolver, CheckerRejectsCorruptedAnswers) {
 TEST(LatticeSolver, SeesAllBeforeItSeesFiner) {
   SolverProblem p;
   const core::CostProfile costs = core::paper_profile();
-  p.model = {from_cost(costs.of(core::StageId::kMap)), from_cost(costs.of(core::StageId::kExport)), from_cost(costs.of(core::StageId::kPlanner))};
+  p.model = {from_cost(costs.of(core::StageId::kMap)), from_cost(costs.of(core::StageId::kExport)),
+             from_cost(costs.of(core::StageId::kPlanner))};
   p.g_avg_m = p.d_obs_m = 1.2;
   p.p1_coarsest_level = 2;
   p.v_sensor_m3 = 30e3;
@@ -136,10 +138,12 @@ TEST(LatticeSolver, AnswersDegenerateProblems) {
   s = solve(p);
   EXPECT_NE(s.active & kEmptyPrecision, 0);
   EXPECT_LE(cell_size_m(s.p0_level), 5.0);
-  for (double* field : {&p.delta_d_s, &p.g_min_m, &p.g_avg_m, &p.d_obs_m, &p.v_sensor_m3, &p.v_map_m3, &p.v0_max_m3, &p.v1_max_m3, &p.v2_max_m3}) {
+  for (double* field : {&p.delta_d_s, &p.g_min_m, &p.g_avg_m, &p.d_obs_m, &p.v_sensor_m3, &p.v_map_m3,
+                        &p.v0_max_m3, &p.v1_max_m3, &p.v2_max_m3}) {
     for (const double value : {kNan, kInfinity, -kInfinity, -1.0, 0.0}) {
       SolverProblem odd = p;
-      *reinterpret_cast<double*>(reinterpret_cast<char*>(&odd) + (reinterpret_cast<char*>(field) - reinterpret_cast<char*>(&p))) = value;
+      *reinterpret_cast<double*>(reinterpret_cast<char*>(&odd) +
+                                 (reinterpret_cast<char*>(field) - reinterpret_cast<char*>(&p))) = value;
       const SolverSolution answer = solve(odd);
       EXPECT_GE(answer.p0_level, 0);
       EXPECT_LT(answer.p0_level, kPrecisionLevels);

@@ -1,4 +1,5 @@
-/// A map view made of boxes, for tests of planners: free inside `free_W`, occupied inside `occupied`, unknown elsewhere.
+/// A map view made of boxes, for tests of planners: free inside `free_W`, occupied inside `occupied`, unknown
+/// elsewhere.
 #pragma once
 
 #include <cmath>
@@ -15,9 +16,12 @@ class BoxView final : public stages::MapView {
 
   [[nodiscard]] bool is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
     ++lookups;
-    if (!(box_W.min_W.array() <= box_W.max_W.array()).all() || !free_W.contains(box_W.min_W) || !free_W.contains(box_W.max_W)) return false;
+    if (!(box_W.min_W.array() <= box_W.max_W.array()).all() || !free_W.contains(box_W.min_W) ||
+        !free_W.contains(box_W.max_W))
+      return false;
     for (const Aabb& o : occupied) {
-      if ((box_W.min_W.array() <= o.max_W.array()).all() && (box_W.max_W.array() >= o.min_W.array()).all()) return false;
+      if ((box_W.min_W.array() <= o.max_W.array()).all() && (box_W.max_W.array() >= o.min_W.array()).all())
+        return false;
     }
     return true;
   }

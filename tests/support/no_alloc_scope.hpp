@@ -1,11 +1,13 @@
-/// Counts the heap calls of the calling thread while it lives. Linking roborun_test_support replaces operator new.
+/// Counts the heap calls of the calling thread while it lives. Linking roborun_test_support replaces operator
+/// new.
 #pragma once
 
 #include <cstdint>
 
 namespace roborun::test {
 
-/// operator new in all its forms is counted in every build; malloc, calloc and realloc as well where no sanitizer owns them.
+/// operator new in all its forms is counted in every build; malloc, calloc and realloc as well where no
+/// sanitizer owns them.
 class NoAllocScope {
  public:
   NoAllocScope() noexcept;

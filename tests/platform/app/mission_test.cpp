@@ -33,7 +33,8 @@ TEST(Mission, FliesTheMiddleEnvironmentWithoutACollisionAndRepeats) {
 
 TEST(Mission, EveryDesignFliesPastTwoPillars) {
   const sitl::World world = sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {});
-  for (const auto design : {governor::Design::kAware, governor::Design::kStatic, governor::Design::kStaticFair}) {
+  for (const auto design :
+       {governor::Design::kAware, governor::Design::kStatic, governor::Design::kStaticFair}) {
     const report::MissionReport report = fly_mission(world, paper_mission(design, 1), {});
     EXPECT_TRUE(report.result.reached_goal) << report.result.design << ": " << report.result.reason;
     EXPECT_FALSE(report.result.collided);

@@ -26,7 +26,8 @@ TEST(Brick, MipsSayWhatTheCellsSay) {
     const std::size_t size = std::size_t{1} << (3 * level);
     for (std::uint32_t m = 0; m < kCellsPerBrick / size; ++m) {
       std::uint8_t expected = 0;
-      for (std::size_t i = m * size; i < (m + 1) * size; ++i) expected = static_cast<std::uint8_t>(expected | sut->flags(0, static_cast<std::uint32_t>(i)));
+      for (std::size_t i = m * size; i < (m + 1) * size; ++i)
+        expected = static_cast<std::uint8_t>(expected | sut->flags(0, static_cast<std::uint32_t>(i)));
       ASSERT_EQ(sut->flags(level, m), expected) << level << " " << m;
     }
   }
@@ -61,7 +62,9 @@ class BrickMapTest : public ::testing::Test {
     config_.max_bricks = max_bricks;
     config_.max_image_side = 64;
     sut_ = std::make_unique<BrickMap>(config_, arena_);
-    scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)}, {Vector3(6, -2, 0), Vector3(8, 2, 12)}, {Vector3(-9, 4, 0), Vector3(-7, 6, 12)}};
+    scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)},
+                    {Vector3(6, -2, 0), Vector3(8, 2, 12)},
+                    {Vector3(-9, 4, 0), Vector3(-7, 6, 12)}};
   }
   std::vector<std::byte> block_;
   core::Arena arena_;
@@ -130,13 +133,16 @@ TEST_F(BrickMapTest, ACoarseLookNeverClearsAFineSurface) {
   std::vector<Vector3> surface;
   for (double y = -1.95; y < 2; y += 0.3) {
     for (const double x : {5.85, 6.15}) {
-      if (sut_->view().at(Vector3(x, y, 5.05), lookups) == CellState::kOccupied) surface.emplace_back(x, y, 5.05);
+      if (sut_->view().at(Vector3(x, y, 5.05), lookups) == CellState::kOccupied)
+        surface.emplace_back(x, y, 5.05);
     }
   }
   ASSERT_GT(surface.size(), 5U);
-  for (int i = 0; i < 20; ++i) (void)sut_->integrate({frames, 2 + i % 3, kInfinity, here}, unlimited_, result_);
+  for (int i = 0; i < 20; ++i)
+    (void)sut_->integrate({frames, 2 + i % 3, kInfinity, here}, unlimited_, result_);
   (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
-  for (const Vector3& p : surface) EXPECT_EQ(sut_->view().at(p, lookups), CellState::kOccupied) << p.transpose();
+  for (const Vector3& p : surface)
+    EXPECT_EQ(sut_->view().at(p, lookups), CellState::kOccupied) << p.transpose();
 }
 
 class SmallBrickMap : public BrickMapTest {
@@ -217,7 +223,8 @@ TEST_F(BrickMapTest, PointCloudAveragesAndProfilesGaps) {
   const std::size_t fine = cloud.points().size();
   for (const CloudPoint& p : cloud.points()) {
     double nearest = 1e9;
-    for (const Aabb& b : scene_.solid) nearest = std::min(nearest, (p.p_W - p.p_W.cwiseMax(b.min_W).cwiseMin(b.max_W)).norm());
+    for (const Aabb& b : scene_.solid)
+      nearest = std::min(nearest, (p.p_W - p.p_W.cwiseMax(b.min_W).cwiseMin(b.max_W)).norm());
     ASSERT_LT(nearest, 0.3);
   }
   // The sphere of sight of 20 m, cut at the floor: between a half ball of 5 m and the box of 40 x 40 x 25 m.
@@ -234,10 +241,11 @@ TEST_F(BrickMapTest, PointCloudAveragesAndProfilesGaps) {
   (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
   SpaceProfile profile;
   std::uint64_t lookups = 0;
-  profile_space({}, cloud.points(), sut_->view(), Trajectory::hold(at_, {}), {}, at_, Vector3::Zero(), Vector3(20, 0, 5),
-                {Vector3(-30, -30, 1), Vector3(30, 30, 12)}, 0.6, profile, lookups);
+  profile_space({}, cloud.points(), sut_->view(), Trajectory::hold(at_, {}), {}, at_, Vector3::Zero(),
+                Vector3(20, 0, 5), {Vector3(-30, -30, 1), Vector3(30, 30, 12)}, 0.6, profile, lookups);
   EXPECT_NEAR(profile.closest_obstacle_m, 5.9, 0.2) << "the front of the nearer pillar";
-  // The gap between the corners (6, 2) and (-7, 4): 13.2 m; the other way round is wider than 20 m or between the same.
+  // The gap between the corners (6, 2) and (-7, 4): 13.2 m; the other way round is wider than 20 m or between
+  // the same.
   EXPECT_GT(profile.gap_average_m, 10.0);
   EXPECT_LT(profile.gap_average_m, 20.0);
   EXPECT_LT(profile.closest_unknown_m, 6.0);
@@ -261,7 +269,8 @@ TEST(DepthPyramid, BoundsEveryRectangle) {
   ASSERT_EQ(sut.build(frame), Status::kOk);
   for (int n = 0; n < 2000; ++n) {
     const int u0 = static_cast<int>(rng.below(96)), v0 = static_cast<int>(rng.below(80));
-    const int u1 = std::min(95, u0 + static_cast<int>(rng.below(40))), v1 = std::min(79, v0 + static_cast<int>(rng.below(40)));
+    const int u1 = std::min(95, u0 + static_cast<int>(rng.below(40))),
+              v1 = std::min(79, v0 + static_cast<int>(rng.below(40)));
     const DepthPyramid::Bound bound = sut.bound(u0, v0, u1, v1);
     for (int v = v0; v <= v1; ++v) {
       for (int u = u0; u <= u1; ++u) {

@@ -74,7 +74,9 @@ TEST_P(OccupancyMapContract, NeverCallsSolidSpaceFree) {
       for (double z = -0.9; z <= 9; z += 0.3) {
         const Vector3 p(x, y, z);
         // Half a cell and more inside the solid, where a cell has nothing to do with free space.
-        if (!scene_.occupied(p + Vector3(0, 0, 0.35)) || !scene_.occupied(p - Vector3(0.35, 0.35, 0)) || !scene_.occupied(p + Vector3(0.35, 0.35, 0))) continue;
+        if (!scene_.occupied(p + Vector3(0, 0, 0.35)) || !scene_.occupied(p - Vector3(0.35, 0.35, 0)) ||
+            !scene_.occupied(p + Vector3(0.35, 0.35, 0)))
+          continue;
         ++checked;
         wrong += at(p) == CellState::kFree ? 1 : 0;
       }
@@ -130,7 +132,8 @@ TEST_P(OccupancyMapContract, SpendsTheVolumeNearestFirst) {
   EXPECT_EQ(at(Vector3(-18, 0, 5)), CellState::kUnknown);
 }
 
-INSTANTIATE_TEST_SUITE_P(Backends, OccupancyMapContract, ::testing::Values("own", "octomap"), [](const auto& instance) { return std::string(instance.param); });
+INSTANTIATE_TEST_SUITE_P(Backends, OccupancyMapContract, ::testing::Values("own", "octomap"),
+                         [](const auto& instance) { return std::string(instance.param); });
 
 }  // namespace
 }  // namespace roborun::stages

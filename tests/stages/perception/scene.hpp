@@ -1,4 +1,5 @@
-/// A small analytic scene for the tests of perception: a floor, walls and pillars made of boxes, seen by one camera or six.
+/// A small analytic scene for the tests of perception: a floor, walls and pillars made of boxes, seen by one
+/// camera or six.
 #pragma once
 
 #include <array>
@@ -38,7 +39,8 @@ struct Scene {
     return best;
   }
   /// Images of the six cameras at p_W, body axes along the world's. The spans live until the next call.
-  [[nodiscard]] std::vector<stages::PosedDepthFrame> look(const Vector3& p_W, int pixels = 64, float range_m = 20.0F) {
+  [[nodiscard]] std::vector<stages::PosedDepthFrame> look(const Vector3& p_W, int pixels = 64,
+                                                          float range_m = 20.0F) {
     const std::array<std::array<double, 9>, 6> mount{{{1, 0, 0, 0, 1, 0, 0, 0, 1},
                                                       {0, -1, 0, 1, 0, 0, 0, 0, 1},
                                                       {-1, 0, 0, 0, -1, 0, 0, 0, 1},
@@ -54,7 +56,8 @@ struct Scene {
         for (int u = 0; u < pixels; ++u) {
           const Vector3 ray(1.0, 1.0 - (u + 0.5) * 2.0 / pixels, 1.0 - (v + 0.5) * 2.0 / pixels);
           const double depth = hit_m(p_W, frames[c].X_WC.R_RT * ray);
-          image[c].push_back(depth < static_cast<double>(range_m) ? static_cast<float>(depth) : std::numeric_limits<float>::infinity());
+          image[c].push_back(depth < static_cast<double>(range_m) ? static_cast<float>(depth)
+                                                                  : std::numeric_limits<float>::infinity());
         }
       }
       frames[c].frame.width = frames[c].frame.height = static_cast<std::uint16_t>(pixels);

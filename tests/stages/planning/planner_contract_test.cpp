@@ -26,7 +26,9 @@ PlanRequest request_to(const Vector3& goal_W) {
 test::BoxView pillar_world() {
   test::BoxView view;
   view.free_W = {Vector3(-24, -24, 0), Vector3(24, 24, 12)};
-  view.occupied = {{Vector3(8, -2, 0), Vector3(12, 2, 20)}, {Vector3(8, 8, 0), Vector3(12, 12, 20)}, {Vector3(8, -12, 0), Vector3(12, -8, 20)}};
+  view.occupied = {{Vector3(8, -2, 0), Vector3(12, 2, 20)},
+                   {Vector3(8, 8, 0), Vector3(12, 12, 20)},
+                   {Vector3(8, -12, 0), Vector3(12, -8, 20)}};
   return view;
 }
 
@@ -105,7 +107,8 @@ TEST_P(PlannerContract, NamesWhatIsWrong) {
   EXPECT_EQ(sut_->plan(r, cell, unlimited_, result_), Status::kNoPath) << "walled in";
 }
 
-INSTANTIATE_TEST_SUITE_P(Planners, PlannerContract, ::testing::Values("own", "RRTstar"), [](const auto& instance) { return std::string(instance.param); });
+INSTANTIATE_TEST_SUITE_P(Planners, PlannerContract, ::testing::Values("own", "RRTstar"),
+                         [](const auto& instance) { return std::string(instance.param); });
 
 TEST(OmplPlanner, RefusesUnknownNames) { EXPECT_EQ(make_ompl_planner("Foo", {}), nullptr); }
 

@@ -53,7 +53,8 @@ void expect_continuous(const Trajectory& t) {
     EXPECT_LT((end.v_W - begin.v_W).norm(), 1e-6);
     EXPECT_LT((end.a_W - begin.a_W).norm(), 1e-5);
     EXPECT_LT((end.j_W - begin.j_W).norm(), 1e-4);
-    EXPECT_LT((snap(t.segment[k], t.segment[k].duration_s) - snap(t.segment[k + 1], 0.0)).norm(), 1e-3 * (1.0 + snap(t.segment[k + 1], 0.0).norm()));
+    EXPECT_LT((snap(t.segment[k], t.segment[k].duration_s) - snap(t.segment[k + 1], 0.0)).norm(),
+              1e-3 * (1.0 + snap(t.segment[k + 1], 0.0).norm()));
   }
 }
 
@@ -68,7 +69,8 @@ TEST(Smoother, IsContinuousUpToSnapWithinTheLimitsAndEndsAtRest) {
     Vector3 heading(1, 0, 0);
     const int count = 2 + static_cast<int>(rng.below(5));
     for (int i = 0; i < count; ++i) {
-      heading = (heading + Vector3(rng.uniform(-0.8, 0.8), rng.uniform(-0.8, 0.8), rng.uniform(-0.2, 0.2))).normalized();
+      heading = (heading + Vector3(rng.uniform(-0.8, 0.8), rng.uniform(-0.8, 0.8), rng.uniform(-0.2, 0.2)))
+                    .normalized();
       path.push_back(path.back() + rng.uniform(1.5, 12.0) * heading);
     }
     const double v0 = rng.uniform(0.0, 5.0);
@@ -99,7 +101,8 @@ TEST(Smoother, FliesFastAndBrakesLate) {
   const test::BoxView view = open_view();
   core::UnlimitedBudget unlimited;
   SmoothResult result;
-  ASSERT_EQ(sut.smooth(request_of({Vector3::Zero(), Vector3(40, 0, 0)}), view, unlimited, result), Status::kOk);
+  ASSERT_EQ(sut.smooth(request_of({Vector3::Zero(), Vector3(40, 0, 0)}), view, unlimited, result),
+            Status::kOk);
   // Trapezoid at 0.6 * 4 = 2.4 m/s2: up and down 7.5 m each in 2.5 s, 25 m at 6 m/s in 4.17 s: 9.17 s.
   EXPECT_NEAR(result.trajectory.duration_s(), 9.17, 0.3 * 9.17);
   EXPECT_GT(result.trajectory.at_s(result.trajectory.duration_s() * 0.5).v_W.norm(), 5.0);
@@ -108,10 +111,13 @@ TEST(Smoother, FliesFastAndBrakesLate) {
 TEST(Smoother, StaysInFreeSpaceAroundACorner) {
   Smoother sut;
   test::BoxView view = open_view();
-  view.occupied = {{Vector3(1.5, -20, -20), Vector3(20, -1.2, 20)}, {Vector3(-20, 1.2, -20), Vector3(9, 20, 20)}};
+  view.occupied = {{Vector3(1.5, -20, -20), Vector3(20, -1.2, 20)},
+                   {Vector3(-20, 1.2, -20), Vector3(9, 20, 20)}};
   core::UnlimitedBudget unlimited;
   SmoothResult result;
-  ASSERT_EQ(sut.smooth(request_of({Vector3(-8, 0, 0), Vector3(11, 0, 0), Vector3(11, 12, 0)}), view, unlimited, result), Status::kOk);
+  ASSERT_EQ(sut.smooth(request_of({Vector3(-8, 0, 0), Vector3(11, 0, 0), Vector3(11, 12, 0)}), view,
+                       unlimited, result),
+            Status::kOk);
   std::uint64_t lookups = 0;
   for (double s = 0.0; s < result.trajectory.duration_s(); s += 0.005) {
     ASSERT_TRUE(view.is_free(Aabb::around(result.trajectory.at_s(s).p_W, 0.9), lookups));
@@ -128,7 +134,8 @@ TEST(Smoother, IsNeverWorseThanStopping) {
   core::UnlimitedBudget unlimited;
   SmoothResult result;
   result.trajectory = Trajectory::hold(Vector3(7, 7, 7), {});
-  EXPECT_EQ(sut.smooth(request_of({Vector3::Zero(), Vector3(10, 0, 0)}), view, unlimited, result), Status::kNoPath);
+  EXPECT_EQ(sut.smooth(request_of({Vector3::Zero(), Vector3(10, 0, 0)}), view, unlimited, result),
+            Status::kNoPath);
   EXPECT_EQ(result.trajectory.hold_W, Vector3(7, 7, 7)) << "untouched";
 }
 
@@ -137,25 +144,33 @@ TEST(Smoother, NamesDegenerateInput) {
   const test::BoxView view = open_view();
   core::UnlimitedBudget unlimited;
   SmoothResult result;
-  const std::vector<std::vector<Vector3>> bad{{Vector3::Zero()}, {Vector3::Zero(), Vector3::Zero()}, {Vector3::Zero(), Vector3(std::nan(""), 0, 0)}};
-  for (const auto& path : bad) EXPECT_EQ(sut.smooth(request_of(path), view, unlimited, result), Status::kInvalidArgument);
-  EXPECT_EQ(sut.smooth(request_of({Vector3::Zero(), Vector3(9, 0, 0)}, Vector3(99, 0, 0)), view, unlimited, result), Status::kInvalidArgument);
+  const std::vector<std::vector<Vector3>> bad{
+      {Vector3::Zero()}, {Vector3::Zero(), Vector3::Zero()}, {Vector3::Zero(), Vector3(std::nan(""), 0, 0)}};
+  for (const auto& path : bad)
+    EXPECT_EQ(sut.smooth(request_of(path), view, unlimited, result), Status::kInvalidArgument);
+  EXPECT_EQ(
+      sut.smooth(request_of({Vector3::Zero(), Vector3(9, 0, 0)}, Vector3(99, 0, 0)), view, unlimited, result),
+      Status::kInvalidArgument);
 }
 
 TEST(Smoother, HasLessSnapThanItsNeighbours) {
-  // Optimality: moving the free derivatives of an inner knot must not lower the integral of squared snap. Three segments,
-  // the middle knots perturbed by adding to segment 1 a polynomial that changes velocity at one joint only.
+  // Optimality: moving the free derivatives of an inner knot must not lower the integral of squared snap.
+  // Three segments, the middle knots perturbed by adding to segment 1 a polynomial that changes velocity at
+  // one joint only.
   Smoother sut;
   const test::BoxView view = open_view();
   core::UnlimitedBudget unlimited;
   SmoothResult result;
-  ASSERT_EQ(sut.smooth(request_of({Vector3::Zero(), Vector3(6, 2, 0), Vector3(12, -1, 0)}), view, unlimited, result), Status::kOk);
+  ASSERT_EQ(sut.smooth(request_of({Vector3::Zero(), Vector3(6, 2, 0), Vector3(12, -1, 0)}), view, unlimited,
+                       result),
+            Status::kOk);
   const Trajectory& t = result.trajectory;
   ASSERT_GE(t.segment_count, 3U);
   const auto cost = [](const PolynomialSegment& s) {
     double sum = 0.0;
     constexpr int kSteps = 2000;
-    for (int i = 0; i < kSteps; ++i) sum += snap(s, s.duration_s * (i + 0.5) / kSteps).squaredNorm() * s.duration_s / kSteps;
+    for (int i = 0; i < kSteps; ++i)
+      sum += snap(s, s.duration_s * (i + 0.5) / kSteps).squaredNorm() * s.duration_s / kSteps;
     return sum;
   };
   // h(t) with h = h' = ... = 0 at both ends but h'' = 1 at the joint, the mirror image on the other side.
@@ -171,15 +186,18 @@ TEST(Smoother, HasLessSnapThanItsNeighbours) {
       // Mirrored: c(1 - tau), expanded.
       for (std::size_t m = 0; m <= k; ++m) {
         double binomial = 1.0;
-        for (std::size_t i = 0; i < m; ++i) binomial = binomial * static_cast<double>(k - i) / static_cast<double>(i + 1);
-        s.coefficient[m] += Vector3(size * c[k] * binomial * (m % 2 == 0 ? 1.0 : -1.0) / std::pow(T, static_cast<double>(m)), 0, 0);
+        for (std::size_t i = 0; i < m; ++i)
+          binomial = binomial * static_cast<double>(k - i) / static_cast<double>(i + 1);
+        s.coefficient[m] += Vector3(
+            size * c[k] * binomial * (m % 2 == 0 ? 1.0 : -1.0) / std::pow(T, static_cast<double>(m)), 0, 0);
       }
     }
     return s;
   };
   const double before = cost(t.segment[0]) + cost(t.segment[1]);
   // Second derivatives at the joint must agree: 2 size / T^2 on both sides.
-  const double ratio = (t.segment[1].duration_s * t.segment[1].duration_s) / (t.segment[0].duration_s * t.segment[0].duration_s);
+  const double ratio = (t.segment[1].duration_s * t.segment[1].duration_s) /
+                       (t.segment[0].duration_s * t.segment[0].duration_s);
   for (const double size : {0.02, -0.02, 0.1, -0.1}) {
     const double after = cost(bump(t.segment[0], true, size)) + cost(bump(t.segment[1], false, size * ratio));
     EXPECT_GT(after, before * (1.0 - 1e-9)) << size;
