@@ -243,6 +243,7 @@ int fly(const Options& options) {
     for (const report::MissionReport& r : reports) fmt::print("{}\n", report::to_json(r.result));
   } else {
     std::vector<report::MissionResult> results;
+    results.reserve(reports.size());
     for (const report::MissionReport& r : reports) results.push_back(r.result);
     fmt::print("{}\n\n{}", title, report::comparison_table(results));
     for (const report::MissionResult& r : results)

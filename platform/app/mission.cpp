@@ -34,22 +34,11 @@ double quantile(std::vector<double> values, double q) {
   return values[static_cast<std::size_t>(std::ceil(at))];
 }
 
-/// Straight up from the ground to the cruise altitude: degree-7 rest to rest.
+/// Straight up from the ground to the cruise altitude.
 Trajectory take_off(const Vector3& ground_W, const Vector3& top_W, MonotonicTime start) {
   Trajectory t;
   t.start_time = start;
-  t.segment_count = 1;
-  PolynomialSegment& s = t.segment[0];
-  s.duration_s = std::max(2.0 * (top_W - ground_W).norm() / kTakeOff_mps, 1.0);
-  const Vector3 way = top_W - ground_W;
-  const double T = s.duration_s;
-  const double T4 = T * T * T * T;
-  s.coefficient[0] = ground_W;
-  s.coefficient[4] = 35.0 / T4 * way;
-  s.coefficient[5] = -84.0 / (T4 * T) * way;
-  s.coefficient[6] = 70.0 / (T4 * T * T) * way;
-  s.coefficient[7] = -20.0 / (T4 * T * T * T) * way;
-  t.brake_begin_s = 0.5 * T;
+  (void)stages::append_rest_to_rest(ground_W, top_W, {kTakeOff_mps, kTakeOff_mps}, t);
   return t;
 }
 
@@ -224,7 +213,8 @@ void MissionRun::record_decision(const DecisionOutput& out) {
   r.missed = out.latency > point.deadline;
   hash_.add(r.latency_s);
   hash_.add(r.deadline_s);
-  hash_.add(static_cast<std::uint64_t>(point.p0_level * 16 + point.p1_level));
+  hash_.add(static_cast<std::uint64_t>(point.p0_level));
+  hash_.add(static_cast<std::uint64_t>(point.p1_level));
   latencies_s_.push_back(r.latency_s);
   report_.decisions.push_back(std::move(r));
 }

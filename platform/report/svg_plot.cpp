@@ -109,7 +109,9 @@ void draw_world(Svg& svg, const Scene& scene, const Frame& f, double height) {
   const double cell = scene.heat_cell_m * f.scale;
   for (int k = 0; k < scene.heat_rows; ++k) {
     for (int i = 0; i < scene.heat_columns; ++i) {
-      const double ratio = scene.heat_ratio[static_cast<std::size_t>(k * scene.heat_columns + i)];
+      const double ratio =
+          scene.heat_ratio[static_cast<std::size_t>(k) * static_cast<std::size_t>(scene.heat_columns) +
+                           static_cast<std::size_t>(i)];
       if (ratio < 0.02) continue;
       const double x = f.x(scene.bounds_W.min_W.x() + i * scene.heat_cell_m);
       const double y = f.y(scene.bounds_W.min_W.y() + (k + 1) * scene.heat_cell_m);

@@ -74,14 +74,12 @@ Status DepthPyramid::build(const firmware_if::DepthFrame& frame) noexcept {
         for (int x = 0; x < width; ++x) {
           const int x1 = std::min(2 * x + 1, fine.width - 1);
           const int y1 = std::min(2 * y + 1, fine.height - 1);
-          const auto at = [&fine](int ix, int iy) {
-            return fine.entry[static_cast<std::size_t>(iy * fine.width + ix)];
-          };
+          const auto at = [&fine](int ix, int iy) { return fine.entry[fine.index(ix, iy)]; };
           const Bound a = at(2 * x, 2 * y);
           const Bound b = at(x1, 2 * y);
           const Bound c = at(2 * x, y1);
           const Bound d = at(x1, y1);
-          level.entry[static_cast<std::size_t>(y * width + x)] = {
+          level.entry[level.index(x, y)] = {
               std::min(std::min(a.least_m, b.least_m), std::min(c.least_m, d.least_m)),
               std::max(std::max(a.most_m, b.most_m), std::max(c.most_m, d.most_m))};
         }
@@ -103,7 +101,7 @@ DepthPyramid::Bound DepthPyramid::bound(int u0, int v0, int u1, int v1) const no
   Bound result{3.0e38F, 0.0F};
   for (int y = v0 >> shift; y <= v1 >> shift; ++y) {
     for (int x = u0 >> shift; x <= u1 >> shift; ++x) {
-      const Bound& entry = level.entry[static_cast<std::size_t>(y * level.width + x)];
+      const Bound& entry = level.entry[level.index(x, y)];
       result.least_m = std::min(result.least_m, entry.least_m);
       result.most_m = std::max(result.most_m, entry.most_m);
     }

@@ -49,6 +49,9 @@ class DepthPyramid {
     std::span<Bound> entry{};
     int width{};
     int height{};
+    [[nodiscard]] std::size_t index(int x, int y) const noexcept {
+      return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+    }
   };
   std::size_t max_side_;
   std::size_t level_count_{0};

@@ -1,6 +1,7 @@
 #include "stages/planning/smoother.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/geometry/inverse.hpp"
@@ -14,6 +15,7 @@ using Matrix4 = Eigen::Matrix4d;
 using Ends3 = Eigen::Matrix<double, 10, 3>;
 using Block = Eigen::Matrix<double, 4, 3>;
 
+constexpr double kAtRest = 0.05;  // m/s and m/s2
 constexpr double kSameWaypoint_m = 0.25;
 constexpr double kMinSegment_s = 0.15;
 constexpr double kCruisePiece_m = 5.0;
@@ -287,7 +289,14 @@ Status Smoother::smooth(const SmoothRequest& request, const MapView& view, core:
       path = finer;
     }
   }
-  return Status::kNoPath;
+  if (request.start.v_W.norm() > kAtRest || request.start.a_W.norm() > kAtRest) return Status::kNoPath;
+  candidate.segment_count = 0;
+  for (std::size_t i = 0; i + 1 < original.size(); ++i) {
+    if (!append_rest_to_rest(original[i], original[i + 1], request.limits, candidate)) return Status::kNoPath;
+  }
+  if (!is_trajectory_free(view, candidate, 0.0, request.radius_m, result.work.units)) return Status::kNoPath;
+  result.trajectory = candidate;
+  return Status::kOk;
 }
 
 Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, const MotionLimits& limits,
@@ -331,6 +340,32 @@ Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, c
   best.brake_begin_s = 0.0;
   out = best;
   return Status::kOk;
+}
+
+bool append_rest_to_rest(const Vector3& from_W, const Vector3& to_W, const MotionLimits& limits,
+                         Trajectory& trajectory) noexcept {
+  if (trajectory.segment_count == Trajectory::kMaxSegments) return false;
+  // The polynomial of degree 9 from 0 to 1 with four derivatives zero at both ends, its greatest speed and
+  // acceleration.
+  constexpr std::array<double, 5> kRatio{126.0, -420.0, 540.0, -315.0, 70.0};
+  constexpr double kPeakSpeed = 2.4609;
+  constexpr double kPeakAcceleration = 9.3723;
+  const Vector3 way = to_W - from_W;
+  const double length_m = way.norm();
+  const double before_s = trajectory.duration_s();
+  PolynomialSegment& segment = trajectory.segment[trajectory.segment_count++];
+  segment = {};
+  segment.duration_s = std::max({kPeakSpeed * length_m / limits.speed_mps,
+                                 std::sqrt(kPeakAcceleration * length_m / limits.acceleration_mps2), 0.1});
+  segment.coefficient[0] = from_W;
+  const double T = segment.duration_s;
+  double power = T * T * T * T;
+  for (std::size_t i = 0; i < kRatio.size(); ++i) {
+    power *= T;
+    segment.coefficient[5 + i] = kRatio[i] / power * way;
+  }
+  trajectory.brake_begin_s = before_s + 0.5 * T;
+  return true;
 }
 
 bool is_trajectory_free(const MapView& view, const Trajectory& trajectory, double from_s, double radius_m,

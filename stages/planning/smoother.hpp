@@ -40,11 +40,11 @@ class Smoother {
   /// Time is given by a trapezoidal speed profile along the path under the limits (corners slower), with a
   /// way-point where the final braking begins; the curve is then checked: too fast, and the segment gets more
   /// time; not free, and the straight piece below it gets one more way-point; still not, and the speed limit
-  /// is lowered. kOk: every point of the trajectory keeps its box free in `view`, and speed and acceleration
-  /// are within the limits (5 %; where the start state itself is beyond a limit, never more beyond than
-  /// there). kNoPath: no such curve was found; kBudgetSpent; kInvalidArgument (not finite, fewer than two
-  /// distinct points): in all three cases `result.trajectory` is untouched. RT-safe: at most 24 solutions of
-  /// at most 47 segments.
+  /// is lowered; from rest, the last resort is to fly the pieces straight and stop at each corner. kOk: every
+  /// point of the trajectory keeps its box free in `view`, and speed and acceleration are within the limits
+  /// (5 %; where the start state itself is beyond a limit, never more beyond than there). kNoPath: no such
+  /// curve was found; kBudgetSpent; kInvalidArgument (not finite, fewer than two distinct points): in all
+  /// three cases `result.trajectory` is untouched. RT-safe: at most 24 solutions of at most 47 segments.
   [[nodiscard]] Status smooth(const SmoothRequest& request, const MapView& view, core::StageBudget& budget,
                               SmoothResult& result) noexcept;
 
@@ -72,6 +72,11 @@ class Smoother {
   Matrix10 coefficient_of_ends_;  ///< Polynomial on [0, 1] from value and four derivatives at both ends.
   Matrix10 snap_cost_;            ///< Integral of squared snap as a quadratic form of the ends, on [0, 1].
 };
+
+/// Adds a straight piece from rest at `from_W` to rest at `to_W` within the limits, and makes its second half
+/// the braking tail. False if there is no room for another segment. RT-safe: O(1).
+[[nodiscard]] bool append_rest_to_rest(const Vector3& from_W, const Vector3& to_W, const MotionLimits& limits,
+                                       Trajectory& trajectory) noexcept;
 
 /// True if the curve from `from_s` (seconds after its start) to its end keeps its box free. `segment` (may be
 /// null) is set to the segment in which it does not. RT-safe: O(length / radius).

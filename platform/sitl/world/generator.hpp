@@ -29,7 +29,7 @@ struct EnvironmentKnobs {
   double gap_m{6.0};  ///< (0, grid). Free space between two obstacles; pillar diameter = grid - gap.
   Distribution distribution{Distribution::kGaussian};
   /// Clusters besides the two at start and goal: positions along the way as a ratio of the distance, 0 .. 1.
-  std::vector<double> extra_centroids_ratio;
+  std::vector<double> extra_centroids_ratio{};
 };
 
 /// Start at (0, 0), goal at (centroid_distance, 0), both at 5 m; the vehicle may fly at 1.5 to 10 m, the

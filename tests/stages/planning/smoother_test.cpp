@@ -139,6 +139,31 @@ TEST(Smoother, IsNeverWorseThanStopping) {
   EXPECT_EQ(result.trajectory.hold_W, Vector3(7, 7, 7)) << "untouched";
 }
 
+TEST(Smoother, StopsAtEachCornerWhereNoCurveFits) {
+  // A slot that leaves two centimetres around the box of the vehicle: any curve would touch.
+  Smoother sut;
+  test::BoxView view = open_view();
+  const double side = 0.92;
+  view.occupied = {{Vector3(-5, side, -5), Vector3(20, 8, 5)},
+                   {Vector3(6.0 + side, -20, -5), Vector3(20, side, 5)},
+                   {Vector3(-5, -20, -5), Vector3(6.0 - side, -side, 5)}};
+  core::UnlimitedBudget unlimited;
+  SmoothResult result;
+  const Vector3 corner(6, 0, 0);
+  const std::vector<Vector3> path{Vector3::Zero(), corner, Vector3(6, -8, 0)};
+  const SmoothRequest request = request_of(path);
+  ASSERT_EQ(sut.smooth(request, view, unlimited, result), Status::kOk);
+  EXPECT_EQ(result.trajectory.end_W(), Vector3(6, -8, 0));
+  bool stops = false;
+  for (double t = 0.0; t < result.trajectory.duration_s(); t += 0.01) {
+    const TrajectoryPoint p = result.trajectory.at_s(t);
+    EXPECT_LE(p.v_W.norm(), request.limits.speed_mps * 1.001);
+    EXPECT_LE(p.a_W.norm(), request.limits.acceleration_mps2 * 1.001);
+    stops = stops || ((p.p_W - corner).norm() < 0.05 && p.v_W.norm() < 0.1);
+  }
+  EXPECT_TRUE(stops);
+}
+
 TEST(Smoother, NamesDegenerateInput) {
   Smoother sut;
   const test::BoxView view = open_view();

@@ -1,0 +1,82 @@
+#include "platform/app/settings_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "platform/app/host_profile.hpp"
+#include "platform/sitl/world/input_error.hpp"
+
+namespace roborun::app {
+namespace {
+
+std::string write(const std::string& name, const std::string& text) {
+  const std::string path = testing::TempDir() + "/" + name;
+  std::ofstream(path, std::ios::binary) << text;
+  return path;
+}
+
+TEST(Settings, OverwritesWhatIsThereAndKeepsTheRest) {
+  MissionConfig config;
+  load_settings(
+      write("settings.toml", "[camera]\npixels = 64\nrange_m = 18.5\n[wind]\nmean_mps = [4, 0, 0]\n"),
+      config);
+  EXPECT_EQ(config.camera.pixels, 64);
+  EXPECT_EQ(config.camera.range_m, 18.5);
+  EXPECT_EQ(config.camera.rate_Hz, sitl::DepthCameraConfig{}.rate_Hz);
+  EXPECT_EQ(config.wind.mean_W_mps, Vector3(4.0, 0.0, 0.0));
+  EXPECT_EQ(config.wind.gust_mps, sitl::WindConfig{}.gust_mps);
+}
+
+TEST(Settings, RefusesWithFileLineKeyAndRange) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"[camera]\nrange_m = 1000\n", ":2: range_m: must be a number from 5 to 100"},
+      {"[camera]\nrange = 10\n", ":2: range: unknown key in [camera]"},
+      {"[wind]\nmean_mps = [30, 0, 0]\n", ":2: mean_mps: must be at most 20 m/s"},
+      {"[engine]\n", "engine: unknown key in the file"},
+      {"camera = 3\n", ":1: camera: must be a table"},
+      {"[flight]\nv_max_mps = nan\n", ":2: v_max_mps: must be a number"},
+  };
+  for (const auto& [text, says] : cases) {
+    MissionConfig config;
+    try {
+      load_settings(write("bad.toml", text), config);
+      ADD_FAILURE() << text;
+    } catch (const sitl::InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(says), std::string::npos) << error.what();
+    }
+  }
+}
+
+TEST(HostProfile, IsMeasuredOnceAndRepeatsFromItsFile) {
+  const std::string path = testing::TempDir() + "/host.toml";
+  (void)std::remove(path.c_str());
+  std::string note;
+  const Profile first = host(path, 1.0, note);
+  EXPECT_NE(note, "") << "says that it measured and where it wrote";
+  note.clear();
+  const Profile again = host(path, 1.0, note);
+  EXPECT_EQ(note, "");
+  const Profile slower = host(path, 2.0, note);
+  for (int level = 0; level < kPrecisionLevels; ++level) {
+    core::Work work;
+    work.level = level;
+    work.units = 1000;
+    work.volume_m3 = 1000.0;
+    for (const core::StageId id : {core::StageId::kMap, core::StageId::kExport, core::StageId::kPlanner}) {
+      EXPECT_EQ(first.costs.cost(id, work), again.costs.cost(id, work));
+      EXPECT_NEAR(static_cast<double>(slower.costs.cost(id, work).count()),
+                  2.0 * static_cast<double>(first.costs.cost(id, work).count()), 2.0);
+    }
+  }
+}
+
+TEST(HostProfile, RefusesAMalformedFile) {
+  std::string note;
+  for (const char* text : {"", "x = 1\n", "[per_unit_s]\nmap = -1\n", "\xff\xfe"}) {
+    EXPECT_THROW((void)host(write("bad_host.toml", text), 1.0, note), sitl::InputError) << text;
+  }
+}
+
+}  // namespace
+}  // namespace roborun::app

@@ -1,0 +1,80 @@
+#include "platform/report/svg_plot.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/platform/report/sample.hpp"
+
+namespace roborun::report {
+namespace {
+
+/// Elements open and close in order, attributes are quoted, and no stray < or & is left in the text.
+bool well_formed(const std::string& xml) {
+  std::vector<std::string> open;
+  for (std::size_t at = 0; at < xml.size(); ++at) {
+    if (xml[at] == '&' && xml.find(';', at) > at + 6) return false;
+    if (xml[at] != '<') continue;
+    const std::size_t end = xml.find('>', at);
+    if (end == std::string::npos) return false;
+    std::string tag = xml.substr(at + 1, end - at - 1);
+    at = end;
+    if (tag[0] == '?' || tag[0] == '!') continue;
+    if (tag[0] == '/') {
+      if (open.empty() || open.back() != tag.substr(1)) return false;
+      open.pop_back();
+    } else if (tag.back() != '/') {
+      open.push_back(tag.substr(0, tag.find_first_of(" \n")));
+    }
+  }
+  return open.empty();
+}
+
+std::size_t count(const std::string& text, const std::string& what) {
+  std::size_t n = 0;
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++n;
+  return n;
+}
+
+Scene scene() {
+  Scene s;
+  s.title = "a <title> & more";
+  s.bounds_W = {{-50.0, -50.0, 0.0}, {950.0, 50.0, 10.0}};
+  s.goal_W = Vector3(900.0, 0.0, 5.0);
+  s.circles = {{100.0, 0.0, 2.0}, {200.0, 5.0, 2.0}};
+  s.rects = {{300.0, 0.0, 10.0, 5.0}};
+  s.zone_borders_m = {120.0, 780.0};
+  s.heat_cell_m = 100.0;
+  s.heat_columns = 10;
+  s.heat_rows = 1;
+  s.heat_ratio = {0.0, 0.5, 0.9, 0.1, 0.0, 0.0, 0.0, 0.0, 0.3, 0.6};
+  return s;
+}
+
+TEST(MissionSvg, IsWellFormedSelfContainedAndDrawsWhatItIsGiven) {
+  const std::vector<MissionReport> missions = {test::sample_mission("aware", 4.0),
+                                               test::sample_mission("static", 0.5)};
+  for (const PathColour colour : {PathColour::kSpeed, PathColour::kPrecision}) {
+    const std::string svg = mission_svg(scene(), missions, colour);
+    EXPECT_TRUE(well_formed(svg));
+    EXPECT_EQ(svg.find("href"), std::string::npos) << "no external resources";
+    EXPECT_GE(count(svg, "<circle"), 2U * 2U) << "pillars in each panel";
+    EXPECT_NE(svg.find("static"), std::string::npos);
+    EXPECT_NE(svg.find("a &lt;title&gt; &amp; more"), std::string::npos);
+    EXPECT_EQ(svg.find("nan"), std::string::npos);
+  }
+}
+
+TEST(MissionSvg, SurvivesAMissionWithoutDecisionsAndAWorldWithoutAnything) {
+  Scene bare;
+  bare.bounds_W = {{0.0, 0.0, 0.0}, {10.0, 10.0, 10.0}};
+  const std::vector<MissionReport> missions = {MissionReport{}};
+  const std::string svg = mission_svg(bare, missions, PathColour::kSpeed);
+  EXPECT_TRUE(well_formed(svg));
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+  EXPECT_EQ(svg.find("inf"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace roborun::report

@@ -1,0 +1,97 @@
+#include "platform/sitl/world/world_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "platform/sitl/world/input_error.hpp"
+
+namespace roborun::sitl {
+namespace {
+
+class WorldFile : public testing::Test {
+ protected:
+  std::string write(const std::string& text, const std::string& name = "world.toml") {
+    const auto path = std::filesystem::path(testing::TempDir()) /
+                      (std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + name);
+    std::ofstream(path, std::ios::binary) << text;
+    return path.string();
+  }
+  /// What the reader says about a text; empty if it takes it.
+  std::string complaint(const std::string& text) {
+    try {
+      (void)load_world(write(text), {});
+      return {};
+    } catch (const InputError& error) {
+      return error.what();
+    }
+  }
+  const std::string good_ =
+      "[world]\nbounds = [[0, -20, 1], [80, 20, 10]]\nstart = [5, 0, 5]\ngoal = [75, 0, 5]\n"
+      "[[pillar]]\nx = 40\ny = 0.5\nradius = 2\n[[box]]\nmin = [20, 5, 0]\nmax = [22, 9, 6]\n";
+};
+
+TEST_F(WorldFile, ReadsPillarsBoxesBoundsAndEnds) {
+  const World world = load_world(write(good_), {});
+  ASSERT_EQ(world.pillars().size(), 1U);
+  EXPECT_EQ(world.pillars()[0].y_m, 0.5);
+  EXPECT_EQ(world.pillars()[0].top_m, 20.0);
+  ASSERT_EQ(world.boxes().size(), 1U);
+  EXPECT_EQ(world.goal_W(), Vector3(75.0, 0.0, 5.0));
+  EXPECT_EQ(world.bounds_W().max_W, Vector3(80.0, 20.0, 10.0));
+}
+
+TEST_F(WorldFile, OtherEndsMayBeAskedFor) {
+  const World world = load_world(write(good_), {Vector3(6.0, 1.0, 4.0), std::nullopt});
+  EXPECT_EQ(world.start_W(), Vector3(6.0, 1.0, 4.0));
+  EXPECT_EQ(world.goal_W(), Vector3(75.0, 0.0, 5.0));
+}
+
+TEST_F(WorldFile, RefusesInOneLineThatNamesFileLineAndKey) {
+  const auto replaced = [this](const std::string& from, const std::string& to) {
+    std::string text = good_;
+    const auto at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return text.replace(at, from.size(), to);
+  };
+  struct Case {
+    std::string text;
+    std::string says;
+  };
+  const Case cases[] = {
+      {replaced("radius = 2", "radius = -2"), "radius: must be above 0"},
+      {replaced("radius = 2", "radius = nan"), ":8: radius: must be a finite number"},
+      {replaced("radius = 2", "radius = 1e300"), ":8: radius: must be a finite number"},
+      {replaced("radius = 2", "radius = 'big'"), ":8: radius: must be a finite number"},
+      {replaced("radius = 2", "raduis = 2"), "raduis: unknown key in [[pillar]]: must be one of"},
+      {replaced("x = 40\n", ""), "x: missing in [[pillar]]"},
+      {replaced("goal = [75, 0, 5]\n", ""), "goal: missing in [world]"},
+      {replaced("goal = [75, 0, 5]", "goal = [75, 0]"), ":4: goal: must be three numbers"},
+      {replaced("goal = [75, 0, 5]", "goal = [175, 0, 5]"), "goal"},
+      {replaced("goal = [75, 0, 5]", "goal = [40, 0, 5]"), "closer than 0.6 m to an obstacle"},
+      {replaced("max = [22", "max = [12"), "max: must be above min on every axis"},
+      {replaced("[world]", "[word]"), "word: unknown key in the file"},
+      {replaced("[world]", "[world"), "world.toml"},
+      {"", "world: missing in the file"},
+      {std::string(100, '\0'), "world.toml"},
+      {std::string(200000, '['), "world.toml"},
+  };
+  for (const Case& c : cases) {
+    const std::string line = complaint(c.text);
+    EXPECT_NE(line.find(c.says), std::string::npos) << "'" << line << "' does not say '" << c.says << "'";
+    EXPECT_EQ(line.find('\n'), std::string::npos) << line;
+  }
+}
+
+TEST_F(WorldFile, RefusesAFileThatIsNotThereAFolderAndAnUnknownKind) {
+  EXPECT_THROW((void)load_world("/nonexistent/world.toml", {}), InputError);
+  EXPECT_THROW((void)load_world(write(good_, "world.yaml"), {}), InputError);
+  const auto folder = std::filesystem::path(testing::TempDir()) / "folder.toml";
+  std::filesystem::create_directories(folder);
+  EXPECT_THROW((void)load_world(folder.string(), {}), InputError);
+}
+
+}  // namespace
+}  // namespace roborun::sitl
