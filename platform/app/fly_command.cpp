@@ -51,6 +51,7 @@ std::vector<std::string> split(const std::string& text) {
   std::vector<std::string> parts;
   std::istringstream stream(text);
   for (std::string part; std::getline(stream, part, ',');) parts.push_back(part);
+  if (text.empty() || text.back() == ',') parts.emplace_back();  // getline drops an empty last one
   return parts;
 }
 
@@ -192,7 +193,6 @@ int fly(const Options& options) {
   // Everything is checked before the first metre is flown.
   std::vector<governor::Design> designs;
   for (const std::string& name : split(options.design)) designs.push_back(design_of(name));
-  if (designs.empty()) (void)design_of(options.design);
   const sitl::Mission mission = mission_of(options.mission);
   const std::uint64_t seed = seed_of(options.seed);
   if (options.colour != "speed" && options.colour != "precision") {
@@ -306,7 +306,7 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
   fly_app->add_option("--start", options->start, "With --world: X,Y,Z in metres");
   fly_app->add_option("--goal", options->goal, "With --world: X,Y,Z in metres");
   fly_app->add_option("--settings", options->settings,
-                      "Cameras, wind, battery, speed from a TOML file (see platform/app/README.md)");
+                      "Cameras, wind, battery, speed from a TOML file (see platform/README.md)");
   fly_app->add_option("--trace", options->trace, "Write every decision to this CSV file");
   fly_app->add_option("--plot", options->plot, "Write a picture of the mission to this SVG file");
   fly_app->add_option("--color", options->colour, "Colour of the paths: speed or precision")

@@ -200,6 +200,7 @@ double World::clearance_m(const Vector3& p_W, double cap_m) const noexcept {
 double World::congestion_ratio(double x_m, double y_m) const noexcept {
   constexpr double kReach_m = 30.0;
   constexpr double kCell_m = 10.0;
+  constexpr double kHalfDiagonal_m = 7.08;
   int occupied = 0;
   int cells = 0;
   const double z_m = description_.start_W.z();
@@ -207,7 +208,8 @@ double World::congestion_ratio(double x_m, double y_m) const noexcept {
     for (double dx_m = -kReach_m; dx_m <= kReach_m; dx_m += kCell_m) {
       if (dx_m * dx_m + dy_m * dy_m > kReach_m * kReach_m) continue;
       ++cells;
-      if (clearance_m(Vector3(x_m + dx_m, y_m + dy_m, z_m), 0.5 * kCell_m) < 0.5 * kCell_m) ++occupied;
+      const Vector3 cell_W(x_m + dx_m, y_m + dy_m, z_m);
+      if (clearance_m(cell_W, kHalfDiagonal_m) < kHalfDiagonal_m) ++occupied;
     }
   }
   return static_cast<double>(occupied) / cells;

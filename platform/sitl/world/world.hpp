@@ -48,7 +48,8 @@ class World {
                                       double max_m) const noexcept;
   /// Distance from a point to the nearest obstacle (the ground is none), at most cap_m; 0 inside an obstacle.
   [[nodiscard]] double clearance_m(const Vector3& p_W, double cap_m) const noexcept;
-  /// Share of 10 m cells within 30 m of (x, y) that hold an obstacle, 0 .. 1: the colour of the heat map.
+  /// Share of 10 m cells within 30 m of (x, y) with an obstacle no farther from their centre than their
+  /// corners, 0 .. 1: the colour of the heat map.
   [[nodiscard]] double congestion_ratio(double x_m, double y_m) const noexcept;
 
  private:

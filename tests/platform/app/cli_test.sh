@@ -22,6 +22,8 @@ refuses "1 .. 27" fly --env 99
 refuses "1 .. 27" fly --env ""
 refuses "aware, static, static-fair" fly --design foo
 refuses "aware, static, static-fair" fly --design aware,,static
+refuses "aware, static, static-fair" fly --design aware,
+refuses "aware, static, static-fair" fly --design ""
 refuses "paper or host" fly --profile x
 refuses "whole number" fly --seed -1
 refuses "whole number" fly --seed 1x

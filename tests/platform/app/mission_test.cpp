@@ -31,6 +31,13 @@ TEST(Mission, FliesTheMiddleEnvironmentWithoutACollisionAndRepeats) {
   EXPECT_EQ(fly_mission(world, config, {}).result.state_hash, first.result.state_hash);
 }
 
+TEST(Mission, FliesToADisasterZone) {
+  const sitl::World world = sitl::generate(sitl::environment("1").knobs, sitl::Mission::kSearchAndRescue, 2);
+  const report::MissionReport report = fly_mission(world, paper_mission(governor::Design::kAware, 2), {});
+  EXPECT_TRUE(report.result.reached_goal) << report.result.reason;
+  EXPECT_FALSE(report.result.collided);
+}
+
 TEST(Mission, EveryDesignFliesPastTwoPillars) {
   const sitl::World world = sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {});
   for (const auto design :

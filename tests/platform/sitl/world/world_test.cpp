@@ -92,6 +92,10 @@ TEST(World, CongestionIsBetweenZeroAndOneAndHighestInTheCrowd) {
   EXPECT_GT(world.congestion_ratio(30.0, 0.0), world.congestion_ratio(-30.0, 0.0));
   EXPECT_LE(world.congestion_ratio(30.0, 0.0), 1.0);
   EXPECT_EQ(world.congestion_ratio(-40.0, 40.0), 0.0);
+  // Thin pillars on the corners of cells count as well.
+  WorldDescription corner = empty_world();
+  corner.pillars = {{30.0, 0.0, 2.0, 0.0, 20.0}};
+  EXPECT_GT(World(corner).congestion_ratio(25.0, 5.0), 0.05);
 }
 
 }  // namespace

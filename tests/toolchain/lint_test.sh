@@ -1,0 +1,43 @@
+#!/usr/bin/env bash
+# The house checks refuse what they are for, and let a clean tree pass.
+set -u
+root=$(cd "$(dirname "$0")/../.." && pwd)
+tree=$(mktemp -d)
+trap 'rm -rf "$tree"' EXIT
+failed=0
+fresh() {
+  rm -rf "${tree:?}"/*
+  mkdir -p "$tree"/{firmware_if,core,governor,stages,platform/app}
+  echo '#pragma once' >"$tree/core/clean.hpp"
+}
+expect() {
+  local wanted=$1 check=$2 why=$3
+  ROBORUN_ROOT=$tree "$root/toolchain/lint/$check" >/dev/null 2>&1
+  local code=$?
+  if [[ ($wanted == passes && $code -ne 0) || ($wanted == refuses && $code -eq 0) ]]; then
+    echo "FAILED $check: $why: exit code $code"
+    failed=1
+  fi
+}
+fresh; expect passes layers "a clean tree"; expect passes words "a clean tree"
+fresh; echo '#include "stages/x.hpp"' >"$tree/core/bad.hpp"; expect refuses layers "core includes stages"
+fresh; echo '#include "stages/x.hpp"' >"$tree/governor/bad.hpp"; expect refuses layers "governor includes stages"
+fresh; echo '#include "governor/x.hpp"' >"$tree/stages/bad.hpp"; expect refuses layers "stages include governor"
+fresh; echo '#include "core/x.hpp"' >"$tree/firmware_if/bad.hpp"; expect refuses layers "firmware_if includes core"
+fresh; echo '#include <unistd.h>' >"$tree/core/bad.hpp"; expect refuses layers "an OS header in core"
+fresh; mkdir "$tree/extra"; expect refuses layers "another top-level folder"
+fresh; rm "$tree/core/clean.hpp"; expect refuses layers "nothing to check"; expect refuses words "nothing to check"
+for line in 'int* p = new int;' 'void* p = malloc(4);' 'std::vector<int> v;' 'throw 1;' 'std::mutex m;' 'auto t = steady_clock::now();' \
+  'double y = std::sin(x);' '#include <vector>'; do
+  fresh; echo "$line" >"$tree/core/bad.cpp"; expect refuses words "$line"
+done
+fresh; echo '// a new thread may throw' >"$tree/core/comment.cpp"; expect passes words "words in a comment"
+if command -v c++ >/dev/null; then
+  echo '#include <cstdlib>
+  void* grab(unsigned long n) { return std::malloc(n); }' | c++ -x c++ -c -o "$tree/bad.o" - && ar rc "$tree/bad.a" "$tree/bad.o"
+  echo 'int two() { return 2; }' | c++ -x c++ -c -o "$tree/good.o" - && ar rc "$tree/good.a" "$tree/good.o"
+  "$root/toolchain/lint/symbols" "$tree/bad.a" >/dev/null 2>&1 && { echo "FAILED symbols: an archive that calls malloc passes"; failed=1; }
+  "$root/toolchain/lint/symbols" "$tree/good.a" >/dev/null 2>&1 || { echo "FAILED symbols: a clean archive is refused"; failed=1; }
+fi
+[[ $failed -eq 0 ]] && echo "the checks refuse what they are for"
+exit $failed
