@@ -4,6 +4,14 @@
 
 namespace roborun::core {
 
+StageCost slower(const StageCost& cost, double factor) noexcept {
+  StageCost result = cost;
+  result.per_unit_s *= factor;
+  for (double& s : result.fixed_s) s *= factor;
+  for (double& s : result.per_m3_s) s *= factor;
+  return result;
+}
+
 Nanos CostProfile::cost(StageId id, const Work& work) const noexcept {
   const StageCost& c = of(id);
   const auto level = static_cast<std::size_t>(std::clamp(work.level, 0, kPrecisionLevels - 1));

@@ -17,6 +17,9 @@ struct StageCost {
   std::array<double, kPrecisionLevels> per_m3_s{};
 };
 
+/// Everything `factor` times as expensive.
+[[nodiscard]] StageCost slower(const StageCost& cost, double factor) noexcept;
+
 struct CostProfile {
   std::array<StageCost, kStageCount> stage{};
 

@@ -13,68 +13,80 @@ double LatencyModel::latency_s(int level, double volume_m3) const noexcept {
   return fixed_s[i] + slope_s_per_m3[i] * std::max(volume_m3, 0.0);
 }
 
-LatencyModel from_eq4(const Eq4& eq4) noexcept {
+LatencyModel from_eq4(const Eq4& eq4, double finest_m) noexcept {
   LatencyModel model;
   for (int level = 0; level < kPrecisionLevels; ++level) {
-    const double r = 1.0 / cell_size_m(level);
+    const double r = 1.0 / (finest_m * static_cast<double>(1 << level));
     const auto i = static_cast<std::size_t>(level);
     model.fixed_s[i] = std::max(eq4.constant_s, 0.0);
-    model.slope_s_per_m3[i] = std::max(((eq4.q[0] * r + eq4.q[1]) * r + eq4.q[2]) * r * eq4.q[3], 0.0);
+    model.slope_s_per_m3[i] =
+        std::max(((eq4.q[0] * r + eq4.q[1]) * r + eq4.q[2]) * r * eq4.q[3] + eq4.per_m3_s, 0.0);
   }
   return model;
 }
 
 LatencyModel from_cost(const core::StageCost& cost) noexcept { return {cost.fixed_s, cost.per_m3_s}; }
 
-Eq4Fit fit_eq4(std::span<const LatencyPoint> points) noexcept {
-  using Vector4 = Eigen::Vector4d;
-  const auto row_of = [](const LatencyPoint& point) -> Vector4 {
+Eq4 fit_eq4(std::span<const LatencyPoint> points) noexcept {
+  constexpr int kTerms = 5;
+  using Vector5 = Eigen::Matrix<double, kTerms, 1>;
+  using Matrix5 = Eigen::Matrix<double, kTerms, kTerms>;
+  const auto row_of = [](const LatencyPoint& point) -> Vector5 {
     const double r = 1.0 / cell_size_m(point.level);
-    return Vector4(r * r * r * point.volume_m3, r * r * point.volume_m3, r * point.volume_m3, 1.0) /
-           point.latency_s;
+    Vector5 row;
+    row << r * r * r * point.volume_m3, r * r * point.volume_m3, r * point.volume_m3, point.volume_m3, 1.0;
+    return row / point.latency_s;
   };
-  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
-  Vector4 right = Vector4::Zero();
+  Matrix5 normal = Matrix5::Zero();
+  Vector5 right = Vector5::Zero();
   double count = 0.0;
   for (const LatencyPoint& point : points) {
     if (!(point.latency_s > 0.0)) continue;
-    const Vector4 row = row_of(point);
+    const Vector5 row = row_of(point);
     normal += row * row.transpose();
     right += row;
     count += 1.0;
   }
-  Eq4Fit best;
+  Eq4 best;
   double best_cost = 1e300;
-  for (unsigned set = 1; set < 16; ++set) {
+  for (unsigned set = 1; set < (1U << kTerms); ++set) {
     // Scaled to unit diagonal: the features differ by ten orders of magnitude.
-    Eigen::Matrix4d A = Eigen::Matrix4d::Identity();
-    Vector4 b = Vector4::Zero();
-    Vector4 unit = Vector4::Ones();
-    for (int i = 0; i < 4; ++i) unit[i] = normal(i, i) > 0.0 ? 1.0 / std::sqrt(normal(i, i)) : 1.0;
-    for (int i = 0; i < 4; ++i) {
+    Matrix5 A = Matrix5::Identity();
+    Vector5 b = Vector5::Zero();
+    Vector5 unit = Vector5::Ones();
+    for (int i = 0; i < kTerms; ++i) unit[i] = normal(i, i) > 0.0 ? 1.0 / std::sqrt(normal(i, i)) : 1.0;
+    for (int i = 0; i < kTerms; ++i) {
       if (((set >> static_cast<unsigned>(i)) & 1U) == 0) continue;
       b[i] = right[i] * unit[i];
-      for (int k = 0; k < 4; ++k) {
+      for (int k = 0; k < kTerms; ++k) {
         if (((set >> static_cast<unsigned>(k)) & 1U) != 0) A(i, k) = normal(i, k) * unit[i] * unit[k];
       }
     }
-    const Vector4 scaled = core::inverse<4>(A) * b;
-    const Vector4 x = scaled.cwiseProduct(unit);
+    const Vector5 scaled = core::inverse<kTerms>(A).lazyProduct(b);
+    const Vector5 x = scaled.cwiseProduct(unit);
     if (!x.allFinite() || x.minCoeff() < 0.0) continue;
-    const double cost = count - 2.0 * right.dot(x) + x.dot(normal * x);
+    const Vector5 normal_x = normal.lazyProduct(x);
+    const double cost = count - 2.0 * right.dot(x) + x.dot(normal_x);
     if (cost < best_cost) {
       best_cost = cost;
-      best.eq4 = {{x[0], x[1], x[2], 1.0}, x[3]};
+      best = {{x[0], x[1], x[2], 1.0}, x[3], x[4]};
     }
   }
-  const LatencyModel model = from_eq4(best.eq4);
+  return best;
+}
+
+ModelError error_of(const LatencyModel& model, std::span<const LatencyPoint> points) noexcept {
+  ModelError error;
+  double count = 0.0;
   for (const LatencyPoint& point : points) {
     if (!(point.latency_s > 0.0)) continue;
-    const double error = std::fabs(model.latency_s(point.level, point.volume_m3) / point.latency_s - 1.0);
-    best.mean_relative_error += error / count;
-    best.max_relative_error = std::max(best.max_relative_error, error);
+    const double relative = std::fabs(model.latency_s(point.level, point.volume_m3) / point.latency_s - 1.0);
+    error.mean_relative += relative;
+    error.max_relative = std::max(error.max_relative, relative);
+    count += 1.0;
   }
-  return best;
+  if (count > 0.0) error.mean_relative /= count;
+  return error;
 }
 
 void DriftScale::observe(double predicted_s, double spent_s) noexcept {

@@ -18,12 +18,15 @@ struct LatencyModel {
   [[nodiscard]] double latency_s(int level, double volume_m3) const noexcept;
 };
 
-/// Eq. 4: (q0 / p^3 + q1 / p^2 + q2 / p) (q3 v) + constant. Negative results are raised to 0.
+/// Eq. 4: (q0 / p^3 + q1 / p^2 + q2 / p) (q3 v), with two terms added that our own kernels need: a cost of
+/// volume that does not depend on precision, and a constant. Negative results are raised to 0.
 struct Eq4 {
   std::array<double, 4> q{};
+  double per_m3_s{};
   double constant_s{};
 };
-[[nodiscard]] LatencyModel from_eq4(const Eq4& eq4) noexcept;
+/// On the lattice finest_m * 2^level.
+[[nodiscard]] LatencyModel from_eq4(const Eq4& eq4, double finest_m = kFinestCell_m) noexcept;
 /// The part of a cost profile that depends on level and volume.
 [[nodiscard]] LatencyModel from_cost(const core::StageCost& cost) noexcept;
 
@@ -33,15 +36,16 @@ struct LatencyPoint {
   double volume_m3{};
   double latency_s{};
 };
-struct Eq4Fit {
-  Eq4 eq4{};
-  double mean_relative_error{};
-  double max_relative_error{};
+struct ModelError {
+  double mean_relative{};
+  double max_relative{};
 };
 /// Least squares of the relative error with all coefficients >= 0 (so that the model is monotone), q3 = 1, by
-/// trying the 16 sets of active coefficients. Points with latency <= 0 are left out. Start-up only: O(16 *
-/// points).
-[[nodiscard]] Eq4Fit fit_eq4(std::span<const LatencyPoint> points) noexcept;
+/// trying the 31 sets of active coefficients. Points with latency <= 0 are left out. Start-up only:
+/// O(points).
+[[nodiscard]] Eq4 fit_eq4(std::span<const LatencyPoint> points) noexcept;
+/// Of a model on points, which are best not those it was fitted on. Start-up only.
+[[nodiscard]] ModelError error_of(const LatencyModel& model, std::span<const LatencyPoint> points) noexcept;
 
 /// Follows a machine that became slower than its model: predicted times are multiplied by it. Rises at once
 /// to what was seen, falls by 2 % a decision; always within [1, 4].

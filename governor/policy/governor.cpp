@@ -14,6 +14,9 @@ constexpr double kAwareV0_m3 = 60e3;
 constexpr double kAwareV1_m3 = 1e6;
 constexpr double kStaticSpeed_mps = 0.5;
 
+constexpr std::array<core::StageId, 3> kKnobStage{core::StageId::kMap, core::StageId::kExport,
+                                                  core::StageId::kPlanner};
+
 constexpr std::size_t index(core::StageId id) noexcept { return static_cast<std::size_t>(id); }
 
 }  // namespace
@@ -67,25 +70,18 @@ Governor::Governor(const GovernorConfig& config) noexcept : config_(config) {
   }
 }
 
-double Governor::predicted_s(int stage, int level, double volume_m3) const noexcept {
-  const auto i = static_cast<std::size_t>(stage);
-  return scale_[i].value() * config_.model[i].latency_s(level, volume_m3);
+double Governor::predicted_s(std::size_t stage, int level, double volume_m3) const noexcept {
+  return scale(kKnobStage[stage]) * config_.model[stage].latency_s(level, volume_m3);
+}
+
+double Governor::overhead_s() const noexcept {
+  return scale(core::StageId::kPointCloud) * config_.point_cloud_s +
+         scale(core::StageId::kGovernor) * config_.governor_s +
+         scale(core::StageId::kSmoother) * config_.smoother_s;
 }
 
 void Governor::observe(core::StageId id, double predicted_s, double spent_s) noexcept {
-  switch (id) {
-    case core::StageId::kMap:
-      scale_[0].observe(predicted_s / scale_[0].value(), spent_s);
-      break;
-    case core::StageId::kExport:
-      scale_[1].observe(predicted_s / scale_[1].value(), spent_s);
-      break;
-    case core::StageId::kPlanner:
-      scale_[2].observe(predicted_s / scale_[2].value(), spent_s);
-      break;
-    default:
-      break;
-  }
+  scale_[index(id)].observe(predicted_s / scale(id), spent_s);
 }
 
 double Governor::safe_speed_mps(double visible_m, double latency_s) const noexcept {
@@ -103,12 +99,13 @@ Nanos Governor::whole_frames(double time_s) const noexcept {
 }
 
 void Governor::fill_prediction(Decision& d) const noexcept {
-  d.predicted_s[index(core::StageId::kPointCloud)] = config_.point_cloud_s;
-  d.predicted_s[index(core::StageId::kGovernor)] = config_.governor_s;
+  d.predicted_s[index(core::StageId::kPointCloud)] =
+      scale(core::StageId::kPointCloud) * config_.point_cloud_s;
+  d.predicted_s[index(core::StageId::kGovernor)] = scale(core::StageId::kGovernor) * config_.governor_s;
   d.predicted_s[index(core::StageId::kMap)] = predicted_s(0, d.solution.p0_level, d.solution.v0_m3);
   d.predicted_s[index(core::StageId::kExport)] = predicted_s(1, d.solution.p1_level, d.solution.v1_m3);
   d.predicted_s[index(core::StageId::kPlanner)] = predicted_s(2, d.solution.p1_level, d.solution.v2_m3);
-  d.predicted_s[index(core::StageId::kSmoother)] = config_.smoother_s;
+  d.predicted_s[index(core::StageId::kSmoother)] = scale(core::StageId::kSmoother) * config_.smoother_s;
 }
 
 Decision Governor::decide_static(const SpaceProfile& profile) const noexcept {
@@ -149,10 +146,10 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   coarsest = std::max(coarsest - extra, 0);
   const bool near_goal = situation.distance_to_goal_m < policy.near_goal_m;
   if (near_goal) coarsest = std::min(coarsest, 1);
-  const double overhead_s = config_.point_cloud_s + config_.governor_s + config_.smoother_s;
-  const double see_m3 = profile.sensor_volume_m3;
+  const double overhead = overhead_s();
+  const double see_m3 = profile.sensor_volume_m3 > 0.0 ? profile.sensor_volume_m3 : 0.0;  // NaN: nothing
   const auto needed_s = [&](int level, double share) {
-    return (overhead_s + predicted_s(0, level, share * see_m3) + predicted_s(1, level, share * see_m3) +
+    return (overhead + predicted_s(0, level, share * see_m3) + predicted_s(1, level, share * see_m3) +
             predicted_s(2, level, share * policy.planner_share * see_m3)) *
            (1.0 + policy.reserve_ratio);
   };
@@ -179,21 +176,29 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   // Time wins over precision: the deadline belongs to physics. Coarser until enough of the space can be seen
   // in time.
   while (coarsest < config_.coarsest_level && needed_s(coarsest, policy.least_share) > deadline_s) ++coarsest;
+  // Finer than asked for only where perception leaves the planner its share; otherwise perception is cut to
+  // it.
+  int finest = 0;
+  while (finest < coarsest && needed_s(finest, 1.0) > deadline_s) ++finest;
+  const double none_s = needed_s(coarsest, 0.0);
+  const double all_s = needed_s(coarsest, 1.0);
+  const double share = all_s > deadline_s ? std::max(deadline_s - none_s, 0.0) / (all_s - none_s) : 1.0;
 
   // 3. The operating point.
   SolverProblem& p = d.problem;
-  p.delta_d_s = deadline_s * (1.0 - policy.reserve_ratio) - overhead_s;
+  p.delta_d_s = deadline_s * (1.0 - policy.reserve_ratio) - overhead;
   p.model = config_.model;
   for (std::size_t i = 0; i < 3; ++i) {
-    for (double& s : p.model[i].fixed_s) s *= scale_[i].value();
-    for (double& s : p.model[i].slope_s_per_m3) s *= scale_[i].value();
+    for (double& s : p.model[i].fixed_s) s *= scale(kKnobStage[i]);
+    for (double& s : p.model[i].slope_s_per_m3) s *= scale(kKnobStage[i]);
   }
+  p.g_min_m = cell_size_m(finest);
   p.g_avg_m = cell_size_m(coarsest);
-  p.d_obs_m = std::fmax(profile.closest_obstacle_m, cell_size_m(0));
+  p.d_obs_m = std::fmax(profile.closest_obstacle_m, cell_size_m(coarsest));
   p.p1_coarsest_level = coarsest;
-  p.v_sensor_m3 = profile.sensor_volume_m3;
-  p.v_map_m3 = profile.map_volume_m3;
-  p.v0_max_m3 = kAwareV0_m3;
+  p.v_sensor_m3 = see_m3;
+  p.v_map_m3 = profile.map_volume_m3 > 0.0 ? profile.map_volume_m3 : 0.0;
+  p.v0_max_m3 = std::min(kAwareV0_m3, share * see_m3);
   p.v1_max_m3 = kAwareV1_m3;
   p.v2_max_m3 = policy.planner_share * see_m3;
   d.solution = solve(p);
@@ -201,7 +206,7 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   last_level_ = d.solution.p0_level;
 
   // Infeasible: the quickest decision there is; until it is there the vehicle lives on its braking tail.
-  if (d.solution.status == Status::kInfeasible) {
+  if (d.solution.status != Status::kOk) {
     d.solution.v0_m3 = policy.least_share * see_m3;
     d.solution.v1_m3 = d.solution.v0_m3;
     d.solution.v2_m3 = policy.planner_share * d.solution.v0_m3;

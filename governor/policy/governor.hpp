@@ -95,12 +95,18 @@ class Governor {
 
  private:
   [[nodiscard]] Decision decide_static(const SpaceProfile& profile) const noexcept;
-  [[nodiscard]] double predicted_s(int stage, int level, double volume_m3) const noexcept;
+  /// 0 map, 1 export, 2 planner.
+  [[nodiscard]] double predicted_s(std::size_t stage, int level, double volume_m3) const noexcept;
+  /// Of the stages that no knob governs.
+  [[nodiscard]] double overhead_s() const noexcept;
+  [[nodiscard]] double scale(core::StageId id) const noexcept {
+    return scale_[static_cast<std::size_t>(id)].value();
+  }
   void fill_prediction(Decision& decision) const noexcept;
   [[nodiscard]] Nanos whole_frames(double time_s) const noexcept;
 
   GovernorConfig config_;
-  std::array<DriftScale, 3> scale_{};
+  std::array<DriftScale, core::kStageCount> scale_{};
   double v_max_mps_{};
   int last_level_{kPrecisionLevels - 1};
 };

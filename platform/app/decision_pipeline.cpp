@@ -33,7 +33,6 @@ void DecisionPipeline::charge(core::StageId id, const core::Work& work, Decision
   out.work[index(id)] = work;
   out.cost[index(id)] = costs_.cost(id, work);
   out.latency += out.cost[index(id)];
-  governor_.observe(id, out.decision.predicted_s[index(id)], seconds(out.cost[index(id)]));
 }
 
 core::VirtualBudget DecisionPipeline::budget_of(core::StageId id, const DecisionOutput& out) const noexcept {
@@ -88,11 +87,12 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   const TrajectoryPoint start = in.committed->at(takes_over);
   const double r_m = radius_m();
 
-  // Is what we fly still free? If not, the stop takes over as soon as it can.
+  // Is what we fly still free? If not, a stop takes over as soon as it can, unless it would end the freedom
+  // sooner: a straight stop out of a descent meets the ground.
   std::uint64_t check_lookups = 0;
   const double from_s = seconds(in.now - in.committed->start_time);
-  const bool committed_free =
-      is_trajectory_free(view, *in.committed, from_s, config_.vehicle_radius_m, check_lookups);
+  const double committed_until_s =
+      free_until_s(view, *in.committed, from_s, config_.vehicle_radius_m, check_lookups);
 
   // First with room for the smoother to cut corners, then as tight as the vehicle can fly.
   stages::SmoothResult smoothed;
@@ -136,13 +136,19 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   if (out.smoother_status == Status::kOk) {
     out.kind = DecisionKind::kNew;
     out.trajectory = smoothed.trajectory;
-  } else if (!committed_free) {
+  } else if (committed_until_s < 1e300) {
     const MonotonicTime soonest = in.now + out.latency + Nanos{2'500'000};
     const TrajectoryPoint then = in.committed->at(soonest);
+    Trajectory stop;
     if (then.v_W.norm() > 0.05 &&
-        smoother_.brake(then, soonest, {config_.acceleration_mps2, config_.acceleration_mps2},
-                        out.trajectory) == Status::kOk) {
-      out.kind = DecisionKind::kBrake;
+        smoother_.brake(then, soonest, {config_.acceleration_mps2, config_.acceleration_mps2}, stop) ==
+            Status::kOk) {
+      const double stop_until_s = seconds(soonest - in.committed->start_time) +
+                                  free_until_s(view, stop, 0.0, config_.vehicle_radius_m, check_lookups);
+      if (stop_until_s >= committed_until_s) {
+        out.kind = DecisionKind::kBrake;
+        out.trajectory = stop;
+      }
     }
   }
 }
@@ -151,6 +157,8 @@ void DecisionPipeline::decide(const DecisionInput& in, DecisionOutput& out) noex
   out = {};
   perceive(in, out);
   plan(in, out);
+  for (std::size_t i = 0; i < core::kStageCount; ++i)
+    governor_.observe(static_cast<core::StageId>(i), out.decision.predicted_s[i], seconds(out.cost[i]));
   failures_ = out.kind == DecisionKind::kNew ? 0 : failures_ + 1;
 }
 

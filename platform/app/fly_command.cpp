@@ -2,9 +2,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -12,8 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "platform/app/host_profile.hpp"
+#include "platform/app/board_profile.hpp"
 #include "platform/app/mission.hpp"
+#include "platform/app/progress_line.hpp"
 #include "platform/app/settings_file.hpp"
 #include "platform/report/svg_plot.hpp"
 #include "platform/report/table.hpp"
@@ -106,46 +105,13 @@ Profile profile_of(const Options& options) {
     throw InputError(
         fmt::format("--host-factor: {} is out of range: must be above 0, at most 1000", options.host_factor));
   }
-  if (options.profile == "paper") return paper();
-  if (options.profile != "host")
-    throw InputError(fmt::format("--profile: unknown profile '{}': must be paper or host", options.profile));
+  if (options.profile != "host") return load_profile(options.profile);
   std::string note;
   const Profile profile =
       host(options.host_file.empty() ? default_host_path() : options.host_file, options.host_factor, note);
   if (!note.empty()) fmt::print(stderr, "roborun: {}\n", note);
   return profile;
 }
-
-/// A line on the terminal that is rewritten, or one line every ten seconds where there is none.
-class ProgressLine {
- public:
-  explicit ProgressLine(std::string name)
-      : name_(std::move(name)), terminal_(isatty(STDERR_FILENO) != 0), start_(Clock::now()), last_(start_) {}
-  void show(const Progress& p) {
-    const auto now = Clock::now();
-    const double since_s = std::chrono::duration<double>(now - last_).count();
-    if (since_s < (terminal_ ? 0.2 : 10.0)) return;
-    last_ = now;
-    shown_ = true;
-    const double wall_s = std::chrono::duration<double>(now - start_).count();
-    fmt::print(stderr, "{}{:<12} {:3.0f} % of the way, {:6.0f} s flown, {:4.1f} m/s, {:3.0f} x real time{}",
-               terminal_ ? "\r" : "", name_, 100.0 * p.done_ratio, p.time_s, p.speed_mps, p.time_s / wall_s,
-               terminal_ ? "   " : "\n");
-  }
-  ~ProgressLine() {
-    if (terminal_ && shown_) fmt::print(stderr, "\r{:80}\r", "");
-  }
-  ProgressLine(const ProgressLine&) = delete;
-  ProgressLine& operator=(const ProgressLine&) = delete;
-
- private:
-  using Clock = std::chrono::steady_clock;
-  std::string name_;
-  bool terminal_;
-  bool shown_{false};
-  Clock::time_point start_;
-  Clock::time_point last_;
-};
 
 report::Scene scene_of(const sitl::World& world, const std::string& title, double zone_m) {
   report::Scene scene;
@@ -198,6 +164,10 @@ int fly(const Options& options) {
   if (options.colour != "speed" && options.colour != "precision") {
     throw InputError(fmt::format("--color: unknown colour '{}': must be speed or precision", options.colour));
   }
+  for (const std::string& path : {options.trace, options.plot}) {
+    const std::string error = report::cannot_write(path);
+    if (!error.empty()) throw InputError(error);
+  }
   MissionConfig config;
   if (!options.settings.empty()) load_settings(options.settings, config);
   const sitl::Endpoints endpoints{point_of("--start", options.start), point_of("--goal", options.goal)};
@@ -231,8 +201,13 @@ int fly(const Options& options) {
   bool all_reached = true;
   for (const governor::Design design : designs) {
     config.design = design;
-    ProgressLine line(governor::to_string(design));
-    reports.push_back(fly_mission(*world, config, [&line](const Progress& p) { line.show(p); }));
+    ProgressLine line;
+    reports.push_back(fly_mission(*world, config, [&line, design](const Progress& p) {
+      if (!line.due()) return;
+      line.show(fmt::format("{:<12} {:3.0f} % of the way, {:6.0f} s flown, {:4.1f} m/s, {:3.0f} x real time",
+                            governor::to_string(design), 100.0 * p.done_ratio, p.time_s, p.speed_mps,
+                            p.time_s / line.elapsed_s()));
+    }));
     report::MissionResult& result = reports.back().result;
     result.env = env;
     result.mission = options.world.empty() ? options.mission : "world_file";
@@ -287,7 +262,8 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
       ->capture_default_str();
   fly_app
       ->add_option("--profile", options->profile,
-                   "What computing costs: paper (the authors' machine) or host (this one)")
+                   "What computing costs: paper (the authors' machine), host (this one), or a file of "
+                   "roborun calibrate")
       ->capture_default_str();
   fly_app
       ->add_option("--host-factor", options->host_factor,

@@ -58,6 +58,8 @@ class MissionRun {
 
   const sitl::World& world_;
   const MissionConfig& config_;
+  core::CostProfile costs_;  ///< What computing costs now.
+  bool slowed_{false};
   MonotonicTime now_{};
   sitl::Vehicle vehicle_;
   sitl::NavigationSensors sensors_;
@@ -86,6 +88,7 @@ class MissionRun {
 MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
     : world_(world),
       config_(config),
+      costs_(config.costs),
       vehicle_(config.vehicle, config.wind, Vector3(world.start_W().x(), world.start_W().y(), 0.0),
                config.seed),
       sensors_(config.sensors, config.seed),
@@ -123,8 +126,7 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
   g.coarsest_level = coarsest_level_within(world.bounds_W().size().z() / 3.0);
   g.minor_frame = kMinorFrame;
   governor_.emplace(g);
-  pipeline_.emplace(pipeline, config.costs, *governor_, *cloud_, *backends_.map, *backends_.planner,
-                    smoother_);
+  pipeline_.emplace(pipeline, costs_, *governor_, *cloud_, *backends_.map, *backends_.planner, smoother_);
 }
 
 void MissionRun::step_world() {
@@ -158,6 +160,10 @@ void MissionRun::start_decision() {
   if (frames.empty()) {
     next_decision_ = now_ + 4 * kMinorFrame;
     return;
+  }
+  if (!slowed_ && seconds(now_.time_since_epoch()) >= config_.slow_down_at_s) {
+    for (core::StageCost& cost : costs_.stage) cost = core::slower(cost, config_.slow_down_factor);
+    slowed_ = true;
   }
   DecisionInput in;
   in.now = now_;
@@ -202,6 +208,19 @@ void MissionRun::record_decision(const DecisionOutput& out) {
   r.deadline_s = seconds(point.deadline);
   r.latency_s = seconds(out.latency);
   for (std::size_t i = 0; i < core::kStageCount; ++i) r.stage_s[i] = seconds(out.cost[i]);
+  r.predicted_s = out.decision.predicted_s;
+  r.demand_m = out.decision.demand_m;
+  const governor::SolverSolution& solution = out.decision.solution;
+  r.solver = to_string(solution.status);
+  const auto active = [&r](const char* name) {
+    r.active += (r.active.empty() ? "" : "+") + std::string(name);
+  };
+  for (std::size_t i = 0; i < governor::kConstraintCount; ++i) {
+    if (((solution.active >> i) & 1U) != 0) active(governor::to_string(static_cast<governor::Constraint>(i)));
+  }
+  for (const governor::Reason reason : governor::kReasons) {
+    if ((solution.active & reason) != 0) active(governor::to_string(reason));
+  }
   r.speed_limit_mps = point.speed_limit_mps;
   r.visible_m = out.profile.closest_unknown_m;
   r.closest_obstacle_m = out.profile.closest_obstacle_m;

@@ -29,6 +29,9 @@ struct MissionConfig {
   sitl::NavigationSensorsConfig sensors{};
   sitl::VehicleConfig vehicle{};
   sitl::WindConfig wind{};
+  double slow_down_at_s{
+      1e300};  ///< From then on computing takes slow_down_factor times as long: a throttled CPU.
+  double slow_down_factor{1.0};
   double time_limit_s{7200.0};
   double no_progress_s{120.0};  ///< Not nearer to the goal for so long: the mission is given up, hovering.
 };

@@ -40,7 +40,7 @@ void load_settings(const std::string& path, MissionConfig& config) {
   if (!file) throw sitl::InputError(fmt::format("{}: cannot be opened: must be a readable TOML file", path));
   const toml::table root = sitl::parse_toml(path, std::string(std::istreambuf_iterator<char>(file), {}));
   const sitl::TomlReader reader(path);
-  reader.allow_keys(root, "the file", {"camera", "wind", "battery", "flight"});
+  reader.allow_keys(root, "the file", {"camera", "wind", "battery", "flight", "cpu"});
 
   if (const toml::table* t = section(reader, root, "camera",
                                      {"pixels", "range_m", "rate_Hz", "latency_s", "noise_m", "noise_per_m",
@@ -69,6 +69,10 @@ void load_settings(const std::string& path, MissionConfig& config) {
   if (const toml::table* t = section(reader, root, "flight", {"v_max_mps", "time_limit_s"})) {
     read(reader, *t, "v_max_mps", {0.5, 12}, config.v_max_mps);
     read(reader, *t, "time_limit_s", {1, 100000}, config.time_limit_s);
+  }
+  if (const toml::table* t = section(reader, root, "cpu", {"slow_down_at_s", "slow_down_factor"})) {
+    read(reader, *t, "slow_down_at_s", {0, 100000}, config.slow_down_at_s);
+    read(reader, *t, "slow_down_factor", {0.1, 100}, config.slow_down_factor);
   }
 }
 

@@ -61,7 +61,11 @@ struct DecisionRecord {
   std::string budget_source;
   double deadline_s{};
   double latency_s{};
-  std::array<double, core::kStageCount> stage_s{};
+  std::array<double, core::kStageCount> stage_s{};  ///< Spent.
+  std::array<double, core::kStageCount> predicted_s{};
+  std::string solver;  ///< Status of the solver.
+  std::string active;  ///< Names of the active constraints, with + between.
+  double demand_m{};   ///< Coarsest cell that the space allows.
   double speed_limit_mps{};
   double visible_m{};
   double closest_obstacle_m{};

@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
+
+#include "platform/report/svg.hpp"
 
 namespace roborun::report {
 namespace {
@@ -14,77 +15,8 @@ constexpr double kLeft = 70.0;
 constexpr double kRight = 40.0;
 constexpr double kChartHeight = 90.0;
 constexpr double kMaxPanel = 330.0;
-constexpr const char* kInk = "#1f2933";
-constexpr const char* kSoft = "#7b8794";
 constexpr std::array<const char*, 4> kDesignColour{"#0072b2", "#d55e00", "#009e73",
                                                    "#cc79a7"};  // Okabe and Ito
-
-struct Rgb {
-  int r, g, b;
-};
-
-/// A dark-to-bright ramp that stays readable without colour vision: violet, teal, yellow-green.
-Rgb ramp(double ratio) {
-  constexpr std::array<std::array<double, 3>, 6> kStops{
-      {{68, 1, 84}, {65, 68, 135}, {42, 120, 142}, {34, 168, 132}, {122, 209, 81}, {240, 220, 40}}};
-  const double at = std::clamp(ratio, 0.0, 1.0) * (kStops.size() - 1);
-  const auto i = std::min(static_cast<std::size_t>(at), kStops.size() - 2);
-  const double share = at - static_cast<double>(i);
-  const auto mix = [&](std::size_t c) {
-    return static_cast<int>(kStops[i][c] + share * (kStops[i + 1][c] - kStops[i][c]));
-  };
-  return {mix(0), mix(1), mix(2)};
-}
-
-std::string hex(Rgb c) { return fmt::format("#{:02x}{:02x}{:02x}", c.r, c.g, c.b); }
-
-std::string escape(const std::string& raw) {
-  std::string text;
-  for (const char c : raw) {
-    switch (c) {
-      case '&':
-        text += "&amp;";
-        break;
-      case '<':
-        text += "&lt;";
-        break;
-      case '>':
-        text += "&gt;";
-        break;
-      case '"':
-        text += "&quot;";
-        break;
-      default:
-        text += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
-  }
-  return text;
-}
-
-class Svg {
- public:
-  template <typename... Args>
-  void add(fmt::format_string<Args...> format, Args&&... args) {
-    fmt::format_to(std::back_inserter(body_), format, std::forward<Args>(args)...);
-    body_ += '\n';
-  }
-  void text(double x, double y, const std::string& what, const char* anchor = "start", double size = 13,
-            const char* fill = kInk, const char* weight = "normal") {
-    add(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="{}" font-size="{}" fill="{}" font-weight="{}">{}</text>)",
-        x, y, anchor, size, fill, weight, escape(what));
-  }
-  [[nodiscard]] std::string finish(double height) const {
-    return fmt::format(
-        R"(<svg xmlns="http://www.w3.org/2000/svg" width="{0}" height="{1:.0f}" viewBox="0 0 {0} {1:.0f}" font-family="Helvetica, Arial, sans-serif">
-<rect width="100%" height="100%" fill="#ffffff"/>
-{2}</svg>
-)",
-        kWidth, height, body_);
-  }
-
- private:
-  std::string body_;
-};
 
 /// World metres to picture points.
 struct Frame {
@@ -179,7 +111,7 @@ void draw_path(Svg& svg, const MissionReport& mission, const Frame& f, PathColou
   const auto flush = [&] {
     if (!points.empty())
       svg.add(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="2.6" stroke-linejoin="round"/>)",
-              points, hex(ramp(step / 24.0)));
+              points, ramp_colour(step / 24.0));
     points.clear();
   };
   Vector3 last_W = Vector3::Constant(1e9);
@@ -247,7 +179,7 @@ void draw_legend(Svg& svg, PathColour colour, double top_mps, double right, doub
   const double left = right - width;
   for (int i = 0; i <= 24; ++i) {
     svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="10" fill="{}"/>)", left + i * width / 25.0,
-            y, width / 25.0 + 0.5, hex(ramp(i / 24.0)));
+            y, width / 25.0 + 0.5, ramp_colour(i / 24.0));
   }
   const bool speed = colour == PathColour::kSpeed;
   svg.text(left - 8, y + 10, speed ? "path: speed, m/s" : "path: precision p0, m", "end", 12, kInk);
@@ -311,7 +243,7 @@ std::string mission_svg(const Scene& scene, std::span<const MissionReport> missi
            "charts: over the way from start to goal, colours as the squares above; dark circles and boxes: "
            "obstacles; red: congestion",
            "start", 12, kSoft);
-  return svg.finish(y + 4);
+  return svg.finish(kWidth, y + 4);
 }
 
 }  // namespace roborun::report

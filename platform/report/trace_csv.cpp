@@ -1,12 +1,23 @@
 #include "platform/report/trace_csv.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 
 namespace roborun::report {
+
+std::string cannot_write(const std::string& path) {
+  if (path.empty()) return {};
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  std::error_code error;
+  const bool is_folder = std::filesystem::is_directory(path, error);
+  if (!is_folder && access(folder.empty() ? "." : folder.c_str(), W_OK) == 0) return {};
+  return is_folder ? fmt::format("{}: cannot be written: it is a folder", path)
+                   : fmt::format("{}: cannot be written: the folder must exist and be writable", path);
+}
 
 std::string write_file(const std::string& path, const std::string& text) {
   const std::string part = path + ".part";
@@ -34,9 +45,10 @@ std::string write_trace_csv(const std::string& path, std::span<const MissionRepo
       "budget_source,"
       "deadline_s,latency_s";
   for (std::size_t i = 0; i < core::kStageCount; ++i)
-    text += fmt::format(",{}_s", core::to_string(static_cast<core::StageId>(i)));
+    text += fmt::format(",{0}_s,{0}_predicted_s", core::to_string(static_cast<core::StageId>(i)));
   text +=
-      ",visible_m,closest_obstacle_m,gap_average_m,sensor_volume_m3,map_volume_m3,planner,smoother,missed\n";
+      ",visible_m,closest_obstacle_m,gap_average_m,sensor_volume_m3,map_volume_m3,demand_m,solver,active,"
+      "planner,smoother,missed\n";
   for (const MissionReport& mission : missions) {
     for (const DecisionRecord& d : mission.decisions) {
       text += fmt::format(
@@ -45,10 +57,12 @@ std::string write_trace_csv(const std::string& path, std::span<const MissionRepo
           mission.result.design, mission.result.seed, d.time_s, d.p_WB.x(), d.p_WB.y(), d.p_WB.z(),
           d.speed_mps, d.speed_limit_mps, d.p0_m, d.p1_m, d.v0_m3, d.v1_m3, d.v2_m3, d.time_budget_s,
           d.budget_source, d.deadline_s, d.latency_s);
-      for (const double stage_s : d.stage_s) text += fmt::format(",{:.6f}", stage_s);
-      text += fmt::format(",{:.2f},{:.2f},{:.2f},{:.0f},{:.0f},{},{},{}\n", d.visible_m, d.closest_obstacle_m,
-                          d.gap_average_m, d.sensor_volume_m3, d.map_volume_m3, d.planner_status,
-                          d.smoother_status, d.missed ? 1 : 0);
+      for (std::size_t i = 0; i < core::kStageCount; ++i)
+        text += fmt::format(",{:.6f},{:.6f}", d.stage_s[i], d.predicted_s[i]);
+      text +=
+          fmt::format(",{:.2f},{:.2f},{:.2f},{:.0f},{:.0f},{:.3f},{},{},{},{},{}\n", d.visible_m,
+                      d.closest_obstacle_m, d.gap_average_m, d.sensor_volume_m3, d.map_volume_m3, d.demand_m,
+                      d.solver, d.active, d.planner_status, d.smoother_status, d.missed ? 1 : 0);
     }
   }
   return write_file(path, text);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "core/geometry/inverse.hpp"
 #include "core/memory/static_vector.hpp"
@@ -368,10 +369,12 @@ bool append_rest_to_rest(const Vector3& from_W, const Vector3& to_W, const Motio
   return true;
 }
 
-bool is_trajectory_free(const MapView& view, const Trajectory& trajectory, double from_s, double radius_m,
-                        std::uint64_t& lookups, std::size_t* segment) noexcept {
-  if (trajectory.segment_count == 0) return view.is_free(Aabb::around(trajectory.hold_W, radius_m), lookups);
+double free_until_s(const MapView& view, const Trajectory& trajectory, double from_s, double radius_m,
+                    std::uint64_t& lookups, std::size_t* segment) noexcept {
+  constexpr double kForEver = std::numeric_limits<double>::infinity();
   const double start_s = from_s > 0.0 ? from_s : 0.0;
+  if (trajectory.segment_count == 0)
+    return view.is_free(Aabb::around(trajectory.hold_W, radius_m), lookups) ? kForEver : start_s;
   double segment_begin_s = 0.0;
   Vector3 last_W = trajectory.at_s(start_s).p_W;
   for (std::size_t k = 0; k < trajectory.segment_count; ++k) {
@@ -388,14 +391,14 @@ bool is_trajectory_free(const MapView& view, const Trajectory& trajectory, doubl
                          last_W.cwiseMax(p_W) + Vector3::Constant(radius_m)};
         if (!view.is_free(swept, lookups)) {
           if (segment != nullptr) *segment = k;
-          return false;
+          return segment_begin_s + first_s + (duration_s - first_s) * (i - 1) / count;
         }
         last_W = p_W;
       }
     }
     segment_begin_s += duration_s;
   }
-  return true;
+  return kForEver;
 }
 
 }  // namespace roborun::stages

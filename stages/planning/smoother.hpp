@@ -78,10 +78,15 @@ class Smoother {
 [[nodiscard]] bool append_rest_to_rest(const Vector3& from_W, const Vector3& to_W, const MotionLimits& limits,
                                        Trajectory& trajectory) noexcept;
 
-/// True if the curve from `from_s` (seconds after its start) to its end keeps its box free. `segment` (may be
-/// null) is set to the segment in which it does not. RT-safe: O(length / radius).
-[[nodiscard]] bool is_trajectory_free(const MapView& view, const Trajectory& trajectory, double from_s,
-                                      double radius_m, std::uint64_t& lookups,
-                                      std::size_t* segment = nullptr) noexcept;
+/// Seconds after its start up to which the curve, from `from_s` on, keeps its box free; +infinity if to its
+/// end. `segment` (may be null) is set to the segment in which it does not. RT-safe: O(length / radius).
+[[nodiscard]] double free_until_s(const MapView& view, const Trajectory& trajectory, double from_s,
+                                  double radius_m, std::uint64_t& lookups,
+                                  std::size_t* segment = nullptr) noexcept;
+[[nodiscard]] inline bool is_trajectory_free(const MapView& view, const Trajectory& trajectory, double from_s,
+                                             double radius_m, std::uint64_t& lookups,
+                                             std::size_t* segment = nullptr) noexcept {
+  return free_until_s(view, trajectory, from_s, radius_m, lookups, segment) > 1e300;
+}
 
 }  // namespace roborun::stages

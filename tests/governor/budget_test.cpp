@@ -58,10 +58,10 @@ TEST(TimeBudget, NeverGrowsWithSpeedNorShrinksWithVisibility) {
   }
 }
 
-/// Algorithm 1 in steps of 1 ms: the remaining budget runs down with time and is never more than Eq. 1
+/// Algorithm 1 in steps of 0.2 ms: the remaining budget runs down with time and is never more than Eq. 1
 /// allows.
 double dense_reference_s(std::span<const TrajectoryOutlook> w) {
-  constexpr double kStep_s = 1e-3;
+  constexpr double kStep_s = 2e-4;
   double remaining_s = 15.0;
   for (double t = 0.0; t < 15.0; t += kStep_s) {
     TrajectoryOutlook here = w.back();
@@ -81,10 +81,11 @@ double dense_reference_s(std::span<const TrajectoryOutlook> w) {
   return 15.0;
 }
 
-TEST(TrajectoryBudget, IsNeverMoreOptimisticThanADenseReference) {
+TEST(TrajectoryBudget, IsNeverMoreOptimisticThanADenseReferenceAndAtMostAMinorFrameMorePessimistic) {
   core::CounterRng rng(3);
   double worst_pessimism_s = 0.0;
-  for (int n = 0; n < 300; ++n) {
+  int inside = 0;
+  for (int n = 0; n < 400; ++n) {
     std::array<TrajectoryOutlook, 12> w{};
     double t = 0.0;
     double v = rng.uniform(0.0, 6.0);
@@ -96,12 +97,13 @@ TEST(TrajectoryBudget, IsNeverMoreOptimisticThanADenseReference) {
       d = std::clamp(d + rng.uniform(-2.0, 2.0), 0.0, 25.0);
     }
     const double exact_s = seconds(trajectory_budget(w, kRoborunStopping, kLimits));
-    const double dense_s = dense_reference_s(w);
-    ASSERT_LE(exact_s, dense_s + 2e-3);  // the reference's own step, twice
+    const double dense_s = std::max(dense_reference_s(w), seconds(kLimits.shortest));
+    ASSERT_LE(exact_s, dense_s + 4e-4);  // the reference's own step, twice
     worst_pessimism_s = std::max(worst_pessimism_s, dense_s - exact_s);
+    inside += exact_s > seconds(kLimits.shortest) && exact_s < seconds(kLimits.longest) ? 1 : 0;
   }
-  EXPECT_LT(worst_pessimism_s, 0.25);
-  EXPECT_GT(worst_pessimism_s, 0.0);
+  EXPECT_GT(inside, 200) << "otherwise only the limits were compared";
+  EXPECT_LT(worst_pessimism_s, 2.5e-3);
 }
 
 TEST(TrajectoryBudget, CountsPartOfTheFirstSegment) {

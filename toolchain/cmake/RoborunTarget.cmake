@@ -34,7 +34,7 @@ function(roborun_test name)
   target_link_libraries(${name} PRIVATE roborun_flags ${ARG_DEPENDS} GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE ROBORUN_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")
   if(NOT ARG_TIMEOUT)
-    set(ARG_TIMEOUT 120)
+    set(ARG_TIMEOUT 600)  # sanitizers on a busy machine included
   endif()
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABEL}")
 endfunction()

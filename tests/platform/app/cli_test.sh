@@ -8,7 +8,7 @@ passed=0
 refuses() {
   local wanted=$1 out err code
   shift
-  out=$("$roborun" "$@" 2>/tmp/roborun_cli_test.$$)
+  out=$("$roborun" "$@" </dev/null 2>/tmp/roborun_cli_test.$$)
   code=$?
   err=$(cat /tmp/roborun_cli_test.$$)
   if [[ $code -ne 2 || -n "$out" || $(wc -l <<<"$err") -ne 1 || "$err" != *"$wanted"* ]]; then
@@ -24,7 +24,13 @@ refuses "aware, static, static-fair" fly --design foo
 refuses "aware, static, static-fair" fly --design aware,,static
 refuses "aware, static, static-fair" fly --design aware,
 refuses "aware, static, static-fair" fly --design ""
-refuses "paper or host" fly --profile x
+refuses "paper, host, or a file" fly --profile x
+refuses "cannot be opened" explain nope.csv --at 3
+refuses "no column" explain "$data/worlds/two_pillars.toml" --at 3
+refuses "cannot be written" fly --trace /nonexistent/x.csv
+refuses "cannot be written" fly --plot /
+refuses "not JSON" solve
+refuses "cannot be written" calibrate --repeats 1 --out /nonexistent/x.toml
 refuses "whole number" fly --seed -1
 refuses "whole number" fly --seed 1x
 refuses "own or octomap" fly --map foo

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "platform/app/host_profile.hpp"
+#include "platform/app/board_profile.hpp"
 #include "platform/sitl/world/generator.hpp"
 #include "platform/sitl/world/world_file.hpp"
 
@@ -36,6 +36,28 @@ TEST(Mission, FliesToADisasterZone) {
   const report::MissionReport report = fly_mission(world, paper_mission(governor::Design::kAware, 2), {});
   EXPECT_TRUE(report.result.reached_goal) << report.result.reason;
   EXPECT_FALSE(report.result.collided);
+}
+
+TEST(Mission, NoDecisionIsLateFromTheTenthAfterTheProcessorSlowsDown) {
+  const sitl::World world = sitl::generate(sitl::environment("14").knobs, sitl::Mission::kPackageDelivery, 3);
+  MissionConfig config = paper_mission(governor::Design::kAware, 3);
+  config.slow_down_at_s = 80.0;
+  config.slow_down_factor = 2.0;
+  const report::MissionReport report = fly_mission(world, config, {});
+  EXPECT_TRUE(report.result.reached_goal) << report.result.reason;
+  EXPECT_FALSE(report.result.collided);
+  int after = 0;
+  int late_at_once = 0;
+  for (const report::DecisionRecord& d : report.decisions) {
+    if (d.time_s < config.slow_down_at_s) continue;
+    if (++after <= 10) {
+      late_at_once += d.missed ? 1 : 0;
+    } else {
+      EXPECT_FALSE(d.missed) << "decision " << after << " after the slow-down, at " << d.time_s << " s";
+    }
+  }
+  EXPECT_GT(after, 50);
+  EXPECT_GT(late_at_once, 0) << "otherwise the slow-down was not felt";
 }
 
 TEST(Mission, EveryDesignFliesPastTwoPillars) {

@@ -4,7 +4,7 @@
 
 #include <fstream>
 
-#include "platform/app/host_profile.hpp"
+#include "platform/app/board_profile.hpp"
 #include "platform/sitl/world/input_error.hpp"
 
 namespace roborun::app {
@@ -73,7 +73,7 @@ TEST(HostProfile, IsMeasuredOnceAndRepeatsFromItsFile) {
 
 TEST(HostProfile, RefusesAMalformedFile) {
   std::string note;
-  for (const char* text : {"", "x = 1\n", "[per_unit_s]\nmap = -1\n", "\xff\xfe"}) {
+  for (const char* text : {"", "x = 1\n", "[board]\nper_unit_s = [1, 2]\n", "\xff\xfe"}) {
     EXPECT_THROW((void)host(write("bad_host.toml", text), 1.0, note), sitl::InputError) << text;
   }
 }

@@ -38,6 +38,10 @@ TEST(TraceCsv, SaysWhyItCannotWriteAndLeavesNothing) {
   const auto folder = std::filesystem::path(testing::TempDir()) / "is_a_folder.csv";
   std::filesystem::create_directories(folder / "x");
   EXPECT_NE(write_file(folder.string(), "x"), "");
+  EXPECT_NE(cannot_write(folder.string()), "");
+  EXPECT_NE(cannot_write("/nonexistent/folder/trace.csv"), "");
+  EXPECT_EQ(cannot_write(testing::TempDir() + "/new.csv"), "");
+  EXPECT_EQ(cannot_write(""), "");
   EXPECT_FALSE(std::filesystem::exists(folder.string() + ".part"));
 }
 

@@ -1,0 +1,341 @@
+#include "platform/app/board_profile.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "platform/app/backends.hpp"
+#include "platform/report/trace_csv.hpp"
+#include "platform/sitl/world/generator.hpp"
+#include "platform/sitl/world/toml_reader.hpp"
+#include "stages/perception/point_cloud.hpp"
+#include "stages/planning/smoother.hpp"
+
+namespace roborun::app {
+namespace {
+
+constexpr int kPoses = 4;
+constexpr int kVolumes = 8;
+constexpr double kPoseStep_m = 1.5;
+constexpr double kMapReach_m = 40.0;
+constexpr double kPlannerShare = 0.4;
+constexpr std::array<const char*, 3> kStageName{"map", "export", "planner"};
+
+/// Seconds of this thread's own processor time.
+template <typename Work>
+double timed(Work&& work) {
+  timespec begin{};
+  timespec end{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &begin);
+  work();
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &end);
+  return static_cast<double>(end.tv_sec - begin.tv_sec) +
+         1e-9 * static_cast<double>(end.tv_nsec - begin.tv_nsec);
+}
+
+/// Six images from a hover; the memory behind them lives as long as this does.
+class Scan {
+ public:
+  Scan(const sitl::World& world, const Pose& X_WB, std::uint64_t seed) {
+    sitl::DepthCameraConfig config;
+    config.latency_s = 0.0;
+    config.pixel_dropout_ratio =
+        0.0;  // one scan must do: holes near the vehicle would end every plan at once
+    config.frame_dropout_ratio = 0.0;
+    const auto mounts = sitl::six_camera_mounts();
+    cameras_.reserve(mounts.size());
+    for (std::size_t i = 0; i < mounts.size(); ++i) {
+      cameras_.emplace_back(world, config, mounts[i], seed, static_cast<std::uint32_t>(i));
+      cameras_[i].expose(MonotonicTime{}, X_WB);
+      stages::PosedDepthFrame posed;
+      if (cameras_[i].read(posed.frame) != Status::kOk) continue;
+      for (int k = 0; k < 9; ++k) posed.X_WC.R_RT(k / 3, k % 3) = mounts[i].R_BC[static_cast<std::size_t>(k)];
+      posed.X_WC.p_RT = X_WB.p_RT;
+      frames_.push_back(posed);
+    }
+  }
+  [[nodiscard]] std::span<const stages::PosedDepthFrame> frames() const { return frames_; }
+
+ private:
+  std::vector<sitl::SimulatedDepthCamera> cameras_;
+  std::vector<stages::PosedDepthFrame> frames_;
+};
+
+struct Samples {
+  std::vector<double> time_s;
+  double volume_m3{};
+};
+
+class Sweeper {
+ public:
+  Sweeper() : world_(sitl::generate(sitl::environment("14").knobs, sitl::Mission::kPackageDelivery, 1)) {
+    const Vector3 reach(kMapReach_m, kMapReach_m, 0.0);
+    bounds_W_ = {world_.start_W() - reach, world_.start_W() + reach};
+    bounds_W_.min_W.z() = world_.bounds_W().min_W.z() - 3.0;
+    bounds_W_.max_W.z() = world_.bounds_W().max_W.z() + 3.0;
+    block_.resize(backend_bytes(bounds_W_, {}) + stages::PointCloud::arena_bytes({}) + 4096);
+    for (int pose = 0; pose <= kPoses; ++pose) {
+      const Pose X_WB{Matrix3::Identity(), world_.start_W() + Vector3(kPoseStep_m * pose, 0.0, 0.0)};
+      poses_W_.push_back(X_WB.p_RT);
+      scans_.emplace_back(world_, X_WB, static_cast<std::uint64_t>(pose));
+    }
+  }
+
+  /// One decision's stages at a level and a share of the volume in view, on a map that knows the pose before.
+  void run(int pose, int level, int eighth, std::uint64_t seed) {
+    const auto at = static_cast<std::size_t>(pose);
+    core::Arena arena(block_);
+    stages::PointCloud cloud({}, arena);
+    const MapAndPlanner backends = make_backends("own", "own", bounds_W_, {}, arena);
+    core::UnlimitedBudget unlimited;
+    core::Work work;
+    const std::array<Vector3, 1> before{poses_W_[at]};
+    const std::array<Vector3, 1> here{poses_W_[at + 1]};
+    stages::IntegrationResult integrated;
+    (void)backends.map->integrate({scans_[at].frames(), level, 1e9, before}, unlimited, integrated);
+    const auto frames = scans_[at + 1].frames();
+    add_units(core::StageId::kPointCloud, timed([&] { (void)cloud.step(frames, level, unlimited, work); }),
+              work);
+
+    const double share = static_cast<double>(eighth) / kVolumes;
+    const double seen_m3 = cloud.seen_volume_m3();
+    double s = timed([&] {
+      (void)backends.map->integrate({frames, level, share * seen_m3, here}, unlimited, integrated);
+    });
+    add(0, level, eighth, s, integrated.work);
+    s = timed([&] { (void)backends.map->export_view({level, share * seen_m3, here[0]}, unlimited, work); });
+    add(1, level, eighth, s, work);
+
+    stages::PlanRequest request;
+    request.start_W = here[0];
+    request.goal_W = world_.goal_W();
+    request.bounds_W = world_.bounds_W();
+    request.radius_m = 0.9;
+    request.volume_m3 = share * kPlannerShare * seen_m3;
+    request.horizon_m = 24.0;
+    request.seed = seed;
+    stages::PlanResult planned;
+    s = timed([&] { (void)backends.planner->plan(request, backends.map->view(), unlimited, planned); });
+    planned.work.level = level;
+    add(2, level, eighth, s, planned.work);
+    if (planned.path_W.size() < 2) return;
+    stages::SmoothRequest smooth;
+    smooth.path_W = {planned.path_W.begin(), planned.path_W.size()};
+    smooth.start.p_W = here[0];
+    smooth.radius_m = 0.9;
+    stages::SmoothResult smoothed;
+    s = timed([&] { (void)smoother_.smooth(smooth, backends.map->view(), unlimited, smoothed); });
+    add_units(core::StageId::kSmoother, s, smoothed.work);
+  }
+
+  BoardProfile result(BoardSweep& sweep) {
+    BoardProfile board;
+    for (std::size_t i = 0; i < core::kStageCount; ++i)
+      board.per_unit_s[i] = units_[i] > 0.0 ? time_s_[i] / units_[i] : 0.0;
+    for (std::size_t m = 0; m < 3; ++m) {
+      BoardSweep::Stage& points = sweep.stage[m];
+      for (int level = 0; level < kPrecisionLevels; ++level) {
+        for (int eighth = 1; eighth <= kVolumes; ++eighth) {
+          Samples& samples = at(m, level, eighth);
+          std::sort(samples.time_s.begin(), samples.time_s.end());
+          const auto count = static_cast<double>(samples.time_s.size());
+          double sum_s = 0.0;
+          for (const double t : samples.time_s) sum_s += t;
+          const auto last = static_cast<std::size_t>(std::ceil(0.99 * count)) - 1;
+          const bool hold_out = eighth % 3 == 0;
+          const double volume_m3 = samples.volume_m3 / count;
+          (hold_out ? points.mean_hold_out : points.mean).push_back({level, volume_m3, sum_s / count});
+          (hold_out ? points.p99_hold_out : points.p99).push_back({level, volume_m3, samples.time_s[last]});
+        }
+      }
+      StageModel& stage = board.stage[m];
+      stage.mean = governor::fit_eq4(points.mean);
+      stage.p99 = governor::fit_eq4(points.p99);
+      stage.mean_error = governor::error_of(governor::from_eq4(stage.mean), points.mean_hold_out);
+      stage.p99_error = governor::error_of(governor::from_eq4(stage.p99), points.p99_hold_out);
+    }
+    return board;
+  }
+
+ private:
+  Samples& at(std::size_t model, int level, int eighth) {
+    return samples_[model][static_cast<std::size_t>(level)][static_cast<std::size_t>(eighth - 1)];
+  }
+  void add_units(core::StageId id, double s, const core::Work& work) {
+    time_s_[static_cast<std::size_t>(id)] += s;
+    units_[static_cast<std::size_t>(id)] += static_cast<double>(work.units);
+  }
+  void add(std::size_t model, int level, int eighth, double s, const core::Work& work) {
+    Samples& samples = at(model, level, eighth);
+    samples.time_s.push_back(s);
+    samples.volume_m3 += work.volume_m3;
+    constexpr std::array<core::StageId, 3> kId{core::StageId::kMap, core::StageId::kExport,
+                                               core::StageId::kPlanner};
+    add_units(kId[model], s, work);
+  }
+
+  sitl::World world_;
+  Aabb bounds_W_;
+  std::vector<std::byte> block_;
+  std::vector<Vector3> poses_W_;
+  std::vector<Scan> scans_;
+  stages::Smoother smoother_;
+  std::array<std::array<std::array<Samples, kVolumes>, kPrecisionLevels>, 3> samples_;
+  std::array<double, core::kStageCount> time_s_{};
+  std::array<double, core::kStageCount> units_{};
+};
+
+std::string machine_name() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    const auto colon = line.find(": ");
+    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "unknown";
+}
+
+std::array<double, 6> numbers_of(const governor::Eq4& e) {
+  return {e.q[0], e.q[1], e.q[2], e.q[3], e.per_m3_s, e.constant_s};
+}
+
+}  // namespace
+
+BoardProfile measure_board(int repeats, const std::function<void(double)>& progress, BoardSweep& sweep) {
+  Sweeper sweeper;
+  for (int repeat = 0; repeat < repeats; ++repeat) {
+    for (int pose = 0; pose < kPoses; ++pose) {
+      for (int level = 0; level < kPrecisionLevels; ++level) {
+        for (int eighth = 1; eighth <= kVolumes; ++eighth)
+          sweeper.run(pose, level, eighth, static_cast<std::uint64_t>(repeat * kPoses + pose));
+      }
+      if (progress) progress(static_cast<double>(repeat * kPoses + pose + 1) / (repeats * kPoses));
+    }
+  }
+  sweep = {};
+  BoardProfile board = sweeper.result(sweep);
+  board.machine = machine_name();
+  return board;
+}
+
+std::string to_toml(const BoardProfile& board) {
+  std::string machine = board.machine;
+  std::erase_if(machine,
+                [](char c) { return c == '"' || c == '\\' || static_cast<unsigned char>(c) < 0x20; });
+  std::string text = fmt::format(
+      "# What the stages of roborun cost on a machine; written by roborun calibrate.\n"
+      "# mean, p99: latency = (q0 / p^3 + q1 / p^2 + q2 / p) q3 v + q4 v + q5, in s, m and m3.\n"
+      "[board]\nmachine = \"{}\"\nper_unit_s = [{:.6e}]\n",
+      machine, fmt::join(board.per_unit_s, ", "));
+  for (std::size_t i = 0; i < 3; ++i) {
+    const StageModel& s = board.stage[i];
+    text += fmt::format("\n[{}]\nmean = [{:.6e}]\np99 = [{:.6e}]\n", kStageName[i],
+                        fmt::join(numbers_of(s.mean), ", "), fmt::join(numbers_of(s.p99), ", "));
+    text += fmt::format(
+        "# on points not fitted: mean {:.1f} % (at most {:.1f} %), p99 {:.1f} % (at most {:.1f} %)\n",
+        100.0 * s.mean_error.mean_relative, 100.0 * s.mean_error.max_relative,
+        100.0 * s.p99_error.mean_relative, 100.0 * s.p99_error.max_relative);
+  }
+  return text;
+}
+
+BoardProfile board_from_toml(const std::string& path, const std::string& text) {
+  const toml::table root = sitl::parse_toml(path, text);
+  const sitl::TomlReader reader(path);
+  reader.allow_keys(root, "a board file", {"board", "map", "export", "planner"});
+  const auto table = [&](const char* name) -> const toml::table& {
+    const toml::node& node = reader.need(root, name, "a board file");
+    if (node.as_table() == nullptr) reader.refuse(node, name, fmt::format("must be a table: [{}]", name));
+    return *node.as_table();
+  };
+  const auto read = [&](const toml::table& from, const char* key, const char* where, auto& values) {
+    const toml::node& node = reader.need(from, key, where);
+    const toml::array* array = node.as_array();
+    if (array == nullptr || array->size() != values.size())
+      reader.refuse(node, key, fmt::format("must be {} numbers", values.size()));
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = reader.number((*array)[i], key);
+      if (values[i] < 0.0) reader.refuse(node, key, "must not be negative");
+    }
+  };
+  BoardProfile board;
+  const toml::table& head = table("board");
+  reader.allow_keys(head, "[board]", {"machine", "per_unit_s"});
+  board.machine = head["machine"].value_or(std::string("unknown"));
+  read(head, "per_unit_s", "[board]", board.per_unit_s);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::string where = fmt::format("[{}]", kStageName[i]);
+    const toml::table& stage = table(kStageName[i]);
+    reader.allow_keys(stage, where, {"mean", "p99"});
+    for (const bool mean : {true, false}) {
+      std::array<double, 6> x{};
+      read(stage, mean ? "mean" : "p99", where.c_str(), x);
+      (mean ? board.stage[i].mean : board.stage[i].p99) = {{x[0], x[1], x[2], x[3]}, x[4], x[5]};
+    }
+  }
+  return board;
+}
+
+Profile to_profile(const BoardProfile& board, double factor) {
+  Profile profile;
+  for (std::size_t i = 0; i < core::kStageCount; ++i)
+    profile.costs.stage[i].per_unit_s = factor * board.per_unit_s[i];
+  for (std::size_t i = 0; i < 3; ++i) {
+    profile.model[i] = governor::from_eq4(board.stage[i].p99);
+    for (double& s : profile.model[i].fixed_s) s *= factor;
+    for (double& s : profile.model[i].slope_s_per_m3) s *= factor;
+  }
+  return profile;
+}
+
+Profile paper() {
+  Profile profile;
+  profile.costs = core::paper_profile();
+  profile.model = {governor::from_cost(profile.costs.of(core::StageId::kMap)),
+                   governor::from_cost(profile.costs.of(core::StageId::kExport)),
+                   governor::from_cost(profile.costs.of(core::StageId::kPlanner))};
+  return profile;
+}
+
+std::string default_host_path() {
+  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache != '\0')
+    return fmt::format("{}/roborun/host.toml", cache);
+  if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
+    return fmt::format("{}/.cache/roborun/host.toml", home);
+  return "roborun-host.toml";
+}
+
+Profile host(const std::string& path, double factor, std::string& note) {
+  std::ifstream file(path, std::ios::binary);
+  if (file)
+    return to_profile(board_from_toml(path, std::string(std::istreambuf_iterator<char>(file), {})), factor);
+  // Read back from its own text, so that the first run uses the same digits as all later ones.
+  BoardSweep sweep;
+  const std::string text = to_toml(measure_board(2, {}, sweep));
+  std::error_code ignored;
+  std::filesystem::create_directories(std::filesystem::path(path).parent_path(), ignored);
+  const std::string error = report::write_file(path, text);
+  note = error.empty()
+             ? fmt::format("measured this machine quickly, kept in {} (better: roborun calibrate)", path)
+             : fmt::format("measured this machine for this run only: {}", error);
+  return to_profile(board_from_toml(path, text), factor);
+}
+
+Profile load_profile(const std::string& name) {
+  if (name == "paper") return paper();
+  std::string note;
+  if (name == "host") return host(default_host_path(), 1.0, note);
+  std::ifstream file(name, std::ios::binary);
+  if (!file)
+    throw sitl::InputError(
+        fmt::format("profile '{}': must be paper, host, or a file that roborun calibrate wrote", name));
+  return to_profile(board_from_toml(name, std::string(std::istreambuf_iterator<char>(file), {})), 1.0);
+}
+
+}  // namespace roborun::app

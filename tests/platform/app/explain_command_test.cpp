@@ -1,0 +1,65 @@
+#include "platform/app/explain_command.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "platform/report/trace_csv.hpp"
+#include "platform/sitl/world/input_error.hpp"
+#include "tests/platform/report/sample.hpp"
+
+namespace roborun::app {
+namespace {
+
+std::string trace() {
+  std::vector<report::MissionReport> missions{test::sample_mission("aware", 4.0),
+                                              test::sample_mission("static", 0.5)};
+  for (report::MissionReport& m : missions) {
+    for (report::DecisionRecord& d : m.decisions) {
+      d.deadline_s = 1.0;
+      d.active = "deadline+d_obs";
+      d.solver = "ok";
+      d.predicted_s[2] = 0.125;
+    }
+  }
+  missions[0].decisions[7].missed = true;
+  const std::string path = testing::TempDir() + "/explain.csv";
+  EXPECT_EQ(report::write_trace_csv(path, missions), "");
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST(Explain, NamesTheDecisionInForceAndEverythingThatSetIt) {
+  const std::string text = explain_decision("t.csv", trace(), 7.9, "");
+  EXPECT_NE(text.find("Decision 8 of aware, at 7.00 s"), std::string::npos) << text;
+  EXPECT_NE(text.find("the trajectory being flown"), std::string::npos);
+  EXPECT_NE(text.find("0.1250"), std::string::npos) << "predicted time of the map";
+  EXPECT_NE(text.find("all the time is used"), std::string::npos);
+  EXPECT_NE(text.find("nearest obstacle"), std::string::npos);
+  EXPECT_NE(text.find("LATE"), std::string::npos);
+  EXPECT_NE(explain_decision("t.csv", trace(), 3.0, "static").find("Decision 4 of static"),
+            std::string::npos);
+}
+
+TEST(Explain, RefusesATimeOutsideAnUnknownDesignAndAnotherFile) {
+  const auto complaint = [](const std::string& csv, double at_s, const std::string& design) -> std::string {
+    try {
+      return explain_decision("t.csv", csv, at_s, design);
+    } catch (const sitl::InputError& error) {
+      return error.what();
+    }
+  };
+  EXPECT_EQ(complaint(trace(), 99.0, ""), "--at: 99 s is outside the trace: must be 0.00 to 20.00");
+  EXPECT_EQ(complaint(trace(), -1.0, ""), "--at: -1 s is outside the trace: must be 0.00 to 20.00");
+  EXPECT_EQ(complaint(trace(), 1.0, "fast"),
+            "t.csv: no decision of design 'fast': must be one of aware, static");
+  EXPECT_NE(complaint("a,b\n1,2\n", 1.0, "").find("no column 'design'"), std::string::npos);
+  EXPECT_NE(complaint("", 1.0, "").find("no column"), std::string::npos);
+  std::string cut = trace();
+  cut.resize(cut.size() - 40);
+  EXPECT_NE(complaint(cut, 1.0, "static").find("fields: must be"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace roborun::app
