@@ -213,7 +213,8 @@ BoardProfile measure_board(int repeats, const std::function<void(double)>& progr
     for (int pose = 0; pose < kPoses; ++pose) {
       for (int level = 0; level < kPrecisionLevels; ++level) {
         for (int eighth = 1; eighth <= kVolumes; ++eighth)
-          sweeper.run(pose, level, eighth, static_cast<std::uint64_t>(repeat * kPoses + pose));
+          sweeper.run(pose, level, eighth,
+                      static_cast<std::uint64_t>(repeat) * kPoses + static_cast<std::uint64_t>(pose));
       }
       if (progress) progress(static_cast<double>(repeat * kPoses + pose + 1) / (repeats * kPoses));
     }
