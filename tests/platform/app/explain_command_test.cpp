@@ -8,6 +8,7 @@
 #include "platform/report/trace_csv.hpp"
 #include "platform/sitl/world/input_error.hpp"
 #include "tests/platform/report/sample.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace roborun::app {
 namespace {
@@ -24,7 +25,7 @@ std::string trace() {
     }
   }
   missions[0].decisions[7].missed = true;
-  const std::string path = testing::TempDir() + "/explain.csv";
+  const std::string path = test::scratch("explain.csv");
   EXPECT_EQ(report::write_trace_csv(path, missions), "");
   std::ifstream file(path);
   return {std::istreambuf_iterator<char>(file), {}};

@@ -6,12 +6,13 @@
 
 #include "platform/app/board_profile.hpp"
 #include "platform/sitl/world/input_error.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace roborun::app {
 namespace {
 
 std::string write(const std::string& name, const std::string& text) {
-  const std::string path = testing::TempDir() + "/" + name;
+  const std::string path = test::scratch(name);
   std::ofstream(path, std::ios::binary) << text;
   return path;
 }
@@ -49,8 +50,7 @@ TEST(Settings, RefusesWithFileLineKeyAndRange) {
 }
 
 TEST(HostProfile, IsMeasuredOnceAndRepeatsFromItsFile) {
-  const std::string path = testing::TempDir() + "/host.toml";
-  (void)std::remove(path.c_str());
+  const std::string path = test::scratch("host.toml");
   std::string note;
   const Profile first = host(path, 1.0, note);
   EXPECT_NE(note, "") << "says that it measured and where it wrote";

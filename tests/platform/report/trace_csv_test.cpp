@@ -9,12 +9,13 @@
 #include <vector>
 
 #include "tests/platform/report/sample.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace roborun::report {
 namespace {
 
 TEST(TraceCsv, HasAHeaderALineADecisionAndAsManyFieldsEverywhere) {
-  const std::string path = testing::TempDir() + "/trace.csv";
+  const std::string path = test::scratch("trace.csv");
   const std::vector<MissionReport> missions = {test::sample_mission("aware", 4.0),
                                                test::sample_mission("static", 0.5)};
   ASSERT_EQ(write_trace_csv(path, missions), "");
@@ -35,12 +36,12 @@ TEST(TraceCsv, HasAHeaderALineADecisionAndAsManyFieldsEverywhere) {
 TEST(TraceCsv, SaysWhyItCannotWriteAndLeavesNothing) {
   const std::string line = write_file("/nonexistent/folder/trace.csv", "x");
   EXPECT_NE(line.find("/nonexistent/folder/trace.csv: cannot be written"), std::string::npos);
-  const auto folder = std::filesystem::path(testing::TempDir()) / "is_a_folder.csv";
+  const auto folder = test::scratch_folder() / "is_a_folder.csv";
   std::filesystem::create_directories(folder / "x");
   EXPECT_NE(write_file(folder.string(), "x"), "");
   EXPECT_NE(cannot_write(folder.string()), "");
   EXPECT_NE(cannot_write("/nonexistent/folder/trace.csv"), "");
-  EXPECT_EQ(cannot_write(testing::TempDir() + "/new.csv"), "");
+  EXPECT_EQ(cannot_write(test::scratch("new.csv")), "");
   EXPECT_EQ(cannot_write(""), "");
   EXPECT_FALSE(std::filesystem::exists(folder.string() + ".part"));
 }

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "platform/sitl/world/input_error.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace roborun::sitl {
 namespace {
@@ -14,10 +15,9 @@ namespace {
 class WorldFile : public testing::Test {
  protected:
   std::string write(const std::string& text, const std::string& name = "world.toml") {
-    const auto path = std::filesystem::path(testing::TempDir()) /
-                      (std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + name);
+    const std::string path = test::scratch(name);
     std::ofstream(path, std::ios::binary) << text;
-    return path.string();
+    return path;
   }
   /// What the reader says about a text; empty if it takes it.
   std::string complaint(const std::string& text) {
@@ -88,7 +88,7 @@ TEST_F(WorldFile, RefusesInOneLineThatNamesFileLineAndKey) {
 TEST_F(WorldFile, RefusesAFileThatIsNotThereAFolderAndAnUnknownKind) {
   EXPECT_THROW((void)load_world("/nonexistent/world.toml", {}), InputError);
   EXPECT_THROW((void)load_world(write(good_, "world.yaml"), {}), InputError);
-  const auto folder = std::filesystem::path(testing::TempDir()) / "folder.toml";
+  const auto folder = test::scratch_folder() / "folder.toml";
   std::filesystem::create_directories(folder);
   EXPECT_THROW((void)load_world(folder.string(), {}), InputError);
 }

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+
+namespace roborun::test {
+
+/// An empty folder of this process alone, gone when the process ends: tests run side by side.
+inline const std::filesystem::path& scratch_folder() {
+  static const struct Folder {
+    Folder() : path(std::filesystem::path(testing::TempDir()) / ("roborun." + std::to_string(getpid()))) {
+      std::filesystem::remove_all(path);
+      std::filesystem::create_directories(path);
+    }
+    ~Folder() {
+      std::error_code ignored;
+      std::filesystem::remove_all(path, ignored);
+    }
+    Folder(const Folder&) = delete;
+    Folder& operator=(const Folder&) = delete;
+    std::filesystem::path path;
+  } folder;
+  return folder.path;
+}
+
+/// A file's path in it.
+inline std::string scratch(const std::string& name) { return (scratch_folder() / name).string(); }
+
+}  // namespace roborun::test
