@@ -62,4 +62,11 @@ FlightSystem::FlightSystem(const sitl::World& world, const MissionConfig& config
                             mail_);
 }
 
+std::vector<report::PoolUse> FlightSystem::pools() const {
+  std::vector<report::PoolUse> pools;
+  for (const core::PoolRecord& p : arena_->plan())
+    pools.push_back({p.name, p.element_bytes, p.count, p.high_water, p.tells_use});
+  return pools;
+}
+
 }  // namespace roborun::app

@@ -32,6 +32,8 @@ class FlightSystem {
   [[nodiscard]] FlightProgram& flight_program() noexcept { return *flight_program_; }
   [[nodiscard]] DecisionProgram& decision_program() noexcept { return *decision_program_; }
   [[nodiscard]] const governor::Governor& governor() const noexcept { return *governor_; }
+  /// The memory plan, with what was used so far.
+  [[nodiscard]] std::vector<report::PoolUse> pools() const;
   [[nodiscard]] const stages::OccupancyMap& map() const noexcept { return *backends_.map; }
 
  private:

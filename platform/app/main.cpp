@@ -8,7 +8,9 @@
 #include <functional>
 #include <string>
 
+#include "platform/app/audit_command.hpp"
 #include "platform/app/fly_command.hpp"
+#include "platform/app/memory_command.hpp"
 #include "platform/sitl/world/input_error.hpp"
 
 namespace {
@@ -29,13 +31,15 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   app.set_version_flag("--version", "roborun 0.1.0");
   std::function<int()> run;
   roborun::app::add_fly_command(app, run);
+  roborun::app::add_audit_command(app, run);
+  roborun::app::add_memory_command(app, run);
   try {
     app.parse(argc, argv);
     return run ? run() : 2;
   } catch (const CLI::Success& done) {
     return app.exit(done);  // --help and --version
   } catch (const CLI::ParseError& error) {
-    return complain(fmt::format("{} (see roborun fly --help)", error.what()));
+    return complain(fmt::format("{} (see roborun --help)", error.what()));
   } catch (const roborun::sitl::InputError& error) {
     return complain(error.what());
   } catch (const std::exception& error) {

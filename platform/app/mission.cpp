@@ -205,6 +205,7 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
     reason = end_reason();
   }
   report_.result.reason = reason;
+  report_.pools = system_.pools();
   summarise(std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count());
   return std::move(report_);
 }

@@ -10,9 +10,10 @@
 namespace roborun::stages {
 
 PointCloud::PointCloud(const Config& config, core::Arena& arena) noexcept
-    : grid_(arena.take<Entry>(config.max_points)),
-      point_(arena.take<CloudPoint>(config.max_points)),
-      used_(arena.take<std::uint32_t>(config.max_points)) {}
+    : grid_(arena.take<Entry>(config.max_points, "cloud grid")),
+      point_(arena.take<CloudPoint>(config.max_points, "cloud points")),
+      point_pool_(arena.last_pool()),
+      used_(arena.take<std::uint32_t>(config.max_points, "cloud used entries")) {}
 
 void PointCloud::set_height_limits(double low_m, double high_m) noexcept {
   low_m_ = low_m;
@@ -88,6 +89,7 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core
     }
   }
   for (std::size_t i = 0; i < count_; ++i) point_[i].p_W /= point_[i].count;
+  point_pool_.use(count_);
   if (usable == 0) return Status::kInvalidArgument;
   if (spent) return Status::kBudgetSpent;
   return full ? Status::kCapacity : Status::kOk;

@@ -3,7 +3,6 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <thread>
@@ -208,18 +207,6 @@ TEST(SpscRing, LosesNothingBetweenThreads) {
   writer.join();
   EXPECT_EQ(wrong, 0U);
 }
-
-#if defined(__SANITIZE_THREAD__)
-TEST(MailboxDeathTest, ThreadSanitizerCatchesTheTwinWithRelaxedOrder) {
-  GTEST_FLAG_SET(death_test_style, "threadsafe");
-  EXPECT_EXIT(
-      {
-        (void)stress<broken::RelaxedMailbox<Message>>(2'000);
-        std::exit(0);  // ThreadSanitizer turns this into 66 if it has reported
-      },
-      ::testing::ExitedWithCode(66), "data race");
-}
-#endif
 
 }  // namespace
 }  // namespace roborun::core

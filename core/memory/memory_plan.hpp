@@ -1,0 +1,28 @@
+/// What memory was taken at start, for what, and how much of it was ever used.
+#pragma once
+
+#include <cstddef>
+
+#include "core/memory/static_vector.hpp"
+
+namespace roborun::core {
+
+/// One pool of equal elements.
+struct PoolRecord {
+  const char* name{"unnamed"};
+  std::size_t element_bytes{};
+  std::size_t count{};
+  std::size_t high_water{};  ///< Most elements in use at once; 0 if its owner does not say.
+  bool tells_use{};          ///< Its owner says how much is in use.
+  /// To be called by the owner whenever its use grows. RT-safe: O(1).
+  void use(std::size_t elements) noexcept {
+    tells_use = true;
+    if (elements > high_water) high_water = elements;
+  }
+  [[nodiscard]] std::size_t bytes() const noexcept { return element_bytes * count; }
+};
+
+/// The pools of an arena in the order in which they were taken. Records never move.
+using MemoryPlan = StaticVector<PoolRecord, 48>;
+
+}  // namespace roborun::core
