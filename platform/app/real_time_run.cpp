@@ -141,6 +141,9 @@ void RealTimeRun::start_threads() {
   missing_ = rt::why_not_real_time();
   const bool fifo = missing_.empty();
   if (const std::string error = rt::lock_memory(); !error.empty()) missing_.push_back(error);
+  // The baselines' libraries; a flight with the own map and planner never calls them.
+  if (config_.mission.map_backend == "own" && config_.mission.planner_backend == "own")
+    rt::unlock_libraries(std::array{"libompl", "libode", "liboctomap", "libboost_"});
   if (!missing_.empty() && !config_.best_effort)
     throw sitl::InputError(fmt::format("cannot run in real time: {} (--best-effort runs on without)",
                                        fmt::join(missing_, "; ")));

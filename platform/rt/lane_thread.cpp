@@ -15,6 +15,13 @@ namespace roborun::rt {
 namespace {
 
 constexpr std::byte kPaint{0xA5};
+constexpr std::size_t kProbeStack_bytes =
+    64 * std::size_t{1024};  // the C library keeps it for the next thread
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr std::size_t kStackFactor = 4;  // their frames are larger
+#else
+constexpr std::size_t kStackFactor = 1;
+#endif
 
 std::vector<int> allowed_cpus() {
   std::vector<int> cpus;
@@ -52,6 +59,7 @@ std::vector<std::string> why_not_real_time() {
   sched_param param{};
   param.sched_priority = core::lane(core::LaneId::kFlight).priority;
   pthread_attr_setschedparam(&attributes, &param);
+  pthread_attr_setstacksize(&attributes, kProbeStack_bytes);
   pthread_t probe{};
   const int error = pthread_create(&probe, &attributes, nothing, nullptr);
   if (error == 0)
@@ -73,7 +81,7 @@ LaneThread::~LaneThread() {
 std::string LaneThread::start(const Placement& placement, bool watch_heap) {
   watch_heap_ = watch_heap;
   const std::string name = core::lane(lane_.id()).name;
-  stack_bytes_ = core::lane(lane_.id()).stack_bytes;
+  stack_bytes_ = kStackFactor * core::lane(lane_.id()).stack_bytes;
   void* block =
       mmap(nullptr, stack_bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_STACK, -1, 0);
   if (block == MAP_FAILED) return "lane " + name + ": no memory for its stack";
