@@ -6,6 +6,7 @@
 #include <memory>
 #include <new>
 #include <span>
+#include <string_view>
 #include <type_traits>
 
 #include "core/memory/memory_plan.hpp"
@@ -34,13 +35,20 @@ class Arena {
     T* first = static_cast<T*>(cursor);
     for (std::size_t i = 0; i < count; ++i) ::new (static_cast<void*>(first + i)) T{};
     used_ = block_.size() - space + count * sizeof(T);
-    (void)plan_.push_back({name, sizeof(T), count, 0, false});
+    (void)plan_.push_back({name, sizeof(T), count});
     return {first, count};
   }
 
   [[nodiscard]] std::size_t used_bytes() const noexcept { return used_; }
   [[nodiscard]] bool exhausted() const noexcept { return exhausted_; }
   [[nodiscard]] const MemoryPlan& plan() const noexcept { return plan_; }
+  /// The first pool of that name, or null: where tests put their faults.
+  [[nodiscard]] PoolRecord* find(std::string_view name) noexcept {
+    for (PoolRecord& pool : plan_) {
+      if (name == pool.name) return &pool;
+    }
+    return nullptr;
+  }
   /// The pool last taken, for its owner to say how much of it is in use; lives as long as the arena. Nothing
   /// is recorded before the first take and beyond the plan's capacity.
   [[nodiscard]] PoolRecord& last_pool() noexcept {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 
 #include "core/memory/static_vector.hpp"
 
@@ -18,6 +20,19 @@ struct PoolRecord {
   void use(std::size_t elements) noexcept {
     tells_use = true;
     if (elements > high_water) high_water = elements;
+  }
+  /// Exhaustion on purpose: from this allocation on (0: the first), so many are refused.
+  struct Fault {
+    std::uint64_t from{std::numeric_limits<std::uint64_t>::max()};
+    std::uint64_t count{0};
+  };
+  Fault fault{};
+  std::uint64_t allocations{0};  ///< Asked for so far, refused ones included.
+  /// To be asked by the owner before it hands out an element: true if it is to behave as if there were none.
+  /// RT-safe: O(1).
+  [[nodiscard]] bool exhausted() noexcept {
+    const std::uint64_t n = allocations++;
+    return n >= fault.from && n - fault.from < fault.count;
   }
   [[nodiscard]] std::size_t bytes() const noexcept { return element_bytes * count; }
 };

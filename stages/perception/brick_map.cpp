@@ -98,7 +98,7 @@ bool BrickMap::cell_of(const Vector3& p_W, Cell& cell) const noexcept {
 Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept {
   std::int32_t& slot = slot_[slot_of(bx, by, bz)];
   if (slot < 0) {
-    if (free_count_ == 0 && !give_up_farthest()) {
+    if (brick_pool_->exhausted() || (free_count_ == 0 && !give_up_farthest())) {
       ++counters_.bricks_refused;
       return nullptr;
     }

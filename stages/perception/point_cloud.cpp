@@ -32,7 +32,7 @@ bool PointCloud::add(const Vector3& p_W, double cell_m) noexcept {
   while (grid_[slot].key != 0 && grid_[slot].key != key)
     slot = (slot + 1) & mask;  // bounded: never more than 3/4 full
   if (grid_[slot].key == 0) {
-    if (count_ >= grid_.size() - grid_.size() / 4) {
+    if (point_pool_.exhausted() || count_ >= grid_.size() - grid_.size() / 4) {
       ++counters_.points_dropped;
       return false;
     }

@@ -143,7 +143,7 @@ void RrtStar::try_extend(const PlanRequest& request, const MapView& view, const 
       cost_m = candidate.cost_m + near[i].distance_m;
     }
   }
-  if (parent < 0) return;
+  if (parent < 0 || node_pool_.exhausted()) return;
   const auto self = static_cast<std::int32_t>(count_);
   add_node(p_W, parent, cost_m, work);
   for (std::size_t i = 0; i < count; ++i) {
