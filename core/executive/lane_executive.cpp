@@ -40,7 +40,8 @@ void LaneExecutive::start(MonotonicTime first_release) noexcept {
 }
 
 void LaneExecutive::begin_frame() noexcept {
-  woke_ = clock_.now();
+  if (!awake_) woke_ = clock_.now();
+  awake_ = false;
   lane_.jitter.add(woke_ - release_);
   period_ = lane(id_).period;
   at_ = 0;

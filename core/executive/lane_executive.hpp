@@ -65,6 +65,13 @@ class LaneExecutive {
   [[nodiscard]] SlotId next_slot() const noexcept { return kFrameTable[first_ + at_].id; }
   /// Runs the next slot; the first one of a frame begins it, the last one ends it.
   void step() noexcept;
+  /// The thread woke up for the next frame at `now`: read as soon as it runs, so that what the executive
+  /// itself does counts as its overhead and not as the kernel's jitter. Without it the first step() reads the
+  /// clock.
+  void wake(MonotonicTime now) noexcept {
+    woke_ = now;
+    awake_ = true;
+  }
   void run_frame() noexcept {
     do step();
     while (in_frame_);
@@ -119,6 +126,7 @@ class LaneExecutive {
   Nanos period_{};
   std::size_t at_{0};
   bool in_frame_{false};
+  bool awake_{false};
   bool ending_{false};
   SlotId charged_{};
   MonotonicTime mark_{};  ///< Since when time is `charged_`'s.

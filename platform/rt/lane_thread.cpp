@@ -126,6 +126,7 @@ void LaneThread::loop() noexcept {
     const timespec wake = clock_.raw_time(lane_.release());
     while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &wake, nullptr) == EINTR) {
     }
+    lane_.wake(clock_.now());
     lane_.run_frame();
   }
   counters_ = read_kernel_counters() - before;
