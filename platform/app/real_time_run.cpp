@@ -69,8 +69,8 @@ class Load {
  public:
   explicit Load(bool wanted) {
     if (!wanted) return;
-    const char* arguments[] = {"stress-ng", "--cpu", "0",       "--vm", "1",       "--vm-bytes", "64M",
-                               "--io",      "1",     "--timer", "1",    "--quiet", nullptr};
+    const char* arguments[] = {"stress-ng", "--cpu", "0", "--vm",    "1",    "--vm-bytes",
+                               "64M",       "--io",  "1", "--quiet", nullptr};
     // posix_spawn leaves the strings alone; its signature is older than const.
     const int error =
         posix_spawnp(&pid_, "stress-ng", nullptr, nullptr, const_cast<char**>(arguments), environ);

@@ -88,7 +88,7 @@ std::string name_of(void* address) {
 /// The first frame that is neither the interposer nor the C++ library's operator new or delete.
 std::string caller_of(const Site& site) {
   for (int i = 0; i < site.depth; ++i) {
-    const std::string name = name_of(site.stack[static_cast<std::size_t>(i)]);
+    std::string name = name_of(site.stack[static_cast<std::size_t>(i)]);
     const bool ours = name.find("note") != std::string::npos || name == "malloc" || name == "calloc" ||
                       name == "realloc" || name == "free" || name == "aligned_alloc" ||
                       name == "posix_memalign" || name.rfind("_Znw", 0) == 0 || name.rfind("_Zna", 0) == 0 ||
