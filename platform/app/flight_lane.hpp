@@ -32,6 +32,13 @@ class FlightLane {
   void commit(MonotonicTime now);
   /// Tracks the committed trajectory and commands the motors; nothing before the take-off.
   void track(MonotonicTime now, firmware_if::Motors& motors);
+  /// All three at once, where nobody asks what each of them takes.
+  template <typename Sensors>
+  void step(MonotonicTime now, Sensors& sensors, firmware_if::Motors& motors) {
+    sense(sensors, sensors, sensors);
+    commit(now);
+    track(now, motors);
+  }
 
   [[nodiscard]] const Trajectory& committed() const { return committed_; }
   [[nodiscard]] const stages::Estimator& estimator() const { return estimator_; }
