@@ -44,6 +44,7 @@ void unlock_libraries(std::span<const char* const> names) noexcept {
           if (segment.p_type != PT_LOAD) continue;
           const std::uintptr_t begin = (info->dlpi_addr + segment.p_vaddr) / page * page;
           const std::uintptr_t end = info->dlpi_addr + segment.p_vaddr + segment.p_memsz;
+          // NOLINTNEXTLINE(performance-no-int-to-ptr): the loader gives addresses as numbers
           munlock(reinterpret_cast<const void*>(begin), end - begin);
         }
         return 0;
