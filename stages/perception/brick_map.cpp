@@ -61,12 +61,13 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
       ny_(even_bricks(config.bounds_W.max_W.y() - corner_W_.y())),
       nz_(even_bricks(config.bounds_W.max_W.z() - corner_W_.z())) {
   const std::size_t positions = position_count(config.bounds_W);
-  slot_ = arena.take<std::int32_t>(positions);
-  order_ = arena.take<std::uint32_t>(positions);
-  order_key_ = arena.take<std::uint16_t>(positions);
-  brick_ = arena.take<Brick>(config.max_bricks);
-  free_list_ = arena.take<std::uint32_t>(config.max_bricks);
-  dirty_ = arena.take<std::uint32_t>(config.max_bricks);
+  slot_ = arena.take<std::int32_t>(positions, "map positions");
+  order_ = arena.take<std::uint32_t>(positions, "map order");
+  order_key_ = arena.take<std::uint16_t>(positions, "map order keys");
+  brick_ = arena.take<Brick>(config.max_bricks, "map bricks");
+  brick_pool_ = &arena.last_pool();
+  free_list_ = arena.take<std::uint32_t>(config.max_bricks, "map free list");
+  dirty_ = arena.take<std::uint32_t>(config.max_bricks, "map dirty list");
   std::fill(slot_.begin(), slot_.end(), -1);
   // Highest slot first, so that slots are handed out from 0 up.
   for (std::size_t i = 0; i < free_list_.size(); ++i) {
@@ -97,11 +98,12 @@ bool BrickMap::cell_of(const Vector3& p_W, Cell& cell) const noexcept {
 Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept {
   std::int32_t& slot = slot_[slot_of(bx, by, bz)];
   if (slot < 0) {
-    if (free_count_ == 0 && !give_up_farthest()) {
+    if (brick_pool_->exhausted() || (free_count_ == 0 && !give_up_farthest())) {
       ++counters_.bricks_refused;
       return nullptr;
     }
     slot = static_cast<std::int32_t>(free_list_[--free_count_]);
+    brick_pool_->use(brick_.size() - free_count_);
     brick_[static_cast<std::size_t>(slot)].clear(bx, by, bz);
   }
   Brick& brick = brick_[static_cast<std::size_t>(slot)];

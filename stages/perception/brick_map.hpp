@@ -107,6 +107,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   std::int32_t nx_, ny_, nz_;     ///< Bricks, even numbers.
   std::span<std::int32_t> slot_;  ///< Brick of each position, or -1.
   std::span<Brick> brick_;
+  core::PoolRecord* brick_pool_{nullptr};
   std::span<std::uint32_t> free_list_;
   std::span<std::uint32_t> dirty_;
   std::span<std::uint32_t> order_;  ///< Positions near the cameras, nearest to the trajectory first.

@@ -47,7 +47,7 @@ DepthPyramid::DepthPyramid(core::Arena& arena, std::size_t max_side) noexcept : 
     total += side * side;
     if (side == 1) break;
   }
-  memory_ = arena.take<Bound>(total);
+  memory_ = arena.take<Bound>(total, "map depth pyramid");
 }
 
 Status DepthPyramid::build(const firmware_if::DepthFrame& frame) noexcept {

@@ -28,8 +28,9 @@ Vector3 towards_goal(const PlanRequest& request) noexcept {
 
 RrtStar::RrtStar(const Config& config, core::Arena& arena) noexcept
     : config_(config),
-      node_(arena.take<Node>(config.max_nodes)),
-      visited_(arena.take<std::uint64_t>(kVisited)) {}
+      node_(arena.take<Node>(config.max_nodes, "planner nodes")),
+      node_pool_(arena.last_pool()),
+      visited_(arena.take<std::uint64_t>(kVisited, "planner visited cells")) {}
 
 double RrtStar::promise_m(const Node& node, const Vector3& goal_W) const noexcept {
   return node.cost_m + kUnknownWeight * (goal_W - node.p_W).norm();
@@ -68,6 +69,7 @@ Vector3 RrtStar::sample(const PlanRequest& request, core::CounterRng& rng) const
 
 void RrtStar::add_node(const Vector3& p_W, std::int32_t parent, double cost_m, core::Work& work) noexcept {
   node_[count_++] = {p_W, cost_m, parent};
+  node_pool_.use(count_);
   std::uint64_t key = 1;
   for (int i = 0; i < 3; ++i) {
     const double index = std::clamp(std::floor(p_W[i] / kVisitedCell_m), -1e6, 1e6);
@@ -141,7 +143,7 @@ void RrtStar::try_extend(const PlanRequest& request, const MapView& view, const 
       cost_m = candidate.cost_m + near[i].distance_m;
     }
   }
-  if (parent < 0) return;
+  if (parent < 0 || node_pool_.exhausted()) return;
   const auto self = static_cast<std::int32_t>(count_);
   add_node(p_W, parent, cost_m, work);
   for (std::size_t i = 0; i < count; ++i) {

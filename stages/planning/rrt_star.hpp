@@ -73,6 +73,7 @@ class RrtStar final : public Planner {
 
   Config config_;
   std::span<Node> node_;
+  core::PoolRecord& node_pool_;
   std::span<std::uint64_t> visited_;
   std::size_t count_{0};
 };
