@@ -1,0 +1,236 @@
+// Own map against stock OctoMap on the same images. Ends with one line of JSON: see README.md of stages/perception.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <limits>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/precision.hpp"
+#include "stages/perception/brick_map.hpp"
+#include "tests/support/no_alloc_scope.hpp"
+#include "toolchain/bench/stock_octomap.hpp"
+
+namespace roborun::bench {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int kMovingScans = 5;
+constexpr std::array<StockMode, 4> kModes{StockMode::kPlain, StockMode::kLazy, StockMode::kDiscretised,
+                                          StockMode::kBoth};
+
+/// Time of this thread alone: the machine may be shared.
+double cpu_s() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// The own map and its memory, large enough for everything that the longest range reaches.
+class OwnMap {
+ public:
+  explicit OwnMap(int pixels, double range_m) {
+    config_.bounds_W = {Vector3(-1.8 * range_m, -1.8 * range_m, -9.6),
+                        Vector3(1.8 * range_m + 10.0, 1.8 * range_m, 1.8 * range_m + 9.6)};
+    config_.max_bricks = range_m > 30.0 ? 30000 : 9100;
+    config_.max_image_side = static_cast<std::size_t>(pixels);
+    block_.resize(stages::BrickMap::arena_bytes(config_));
+    reset();
+  }
+  void reset() {
+    core::Arena arena(block_);
+    map_ = std::make_unique<stages::BrickMap>(config_, arena);
+    if (arena.exhausted()) std::abort();
+  }
+  void integrate(const Scan& scan, int level) {
+    const std::array<Vector3, 1> here{scan.p_WB()};
+    core::UnlimitedBudget unlimited;
+    stages::IntegrationResult result;
+    if (map_->integrate({scan.frames(), level, kInfinity, here}, unlimited, result) != Status::kOk) std::abort();
+  }
+  const stages::MapView& view() {
+    core::UnlimitedBudget unlimited;
+    core::Work work;
+    (void)map_->export_view({0, kInfinity, Vector3::Zero()}, unlimited, work);
+    return map_->view();
+  }
+  [[nodiscard]] const stages::BrickMap& map() const { return *map_; }
+
+ private:
+  stages::BrickMap::Config config_;
+  std::vector<std::byte> block_;
+  std::unique_ptr<stages::BrickMap> map_;
+};
+
+const Scan& scan_of(int n, int pixels, int range_m) {
+  static std::map<std::tuple<int, int, int>, std::unique_ptr<Scan>> scans;
+  std::unique_ptr<Scan>& scan = scans[{n, pixels, range_m}];
+  if (!scan) scan = std::make_unique<Scan>(pillar_world(), n, pixels, range_m);
+  return *scan;
+}
+
+OwnMap& own_map(int pixels, int range_m) {
+  static std::map<std::pair<int, int>, std::unique_ptr<OwnMap>> maps;
+  std::unique_ptr<OwnMap>& map = maps[{pixels, range_m}];
+  if (!map) map = std::make_unique<OwnMap>(pixels, range_m);
+  return *map;
+}
+
+struct Case {
+  int level;
+  int range_m;
+  int pixels;
+  bool moving;
+};
+
+std::string name_of(const std::string& who, const Case& c) {
+  char text[96];
+  std::snprintf(text, sizeof text, "%s/%s/%.1fm/range%d/%dx%d", who.c_str(), c.moving ? "moving" : "first",
+                cell_size_m(c.level), c.range_m, c.pixels, c.pixels);
+  return text;
+}
+
+/// One iteration: scan 0 into an empty map; or, moving, the mean of the scans 1 .. kMovingScans after it.
+template <typename ResetFunction, typename InsertFunction>
+void measure(benchmark::State& state, const Case& c, ResetFunction&& reset, InsertFunction&& insert_scan) {
+  std::uint64_t allocations = 0;
+  const int scans = c.moving ? kMovingScans : 1;
+  for ([[maybe_unused]] auto iteration : state) {
+    reset();
+    if (c.moving) insert_scan(0);
+    const test::NoAllocScope scope;
+    const double begin_s = cpu_s();
+    for (int n = 0; n < scans; ++n) insert_scan(c.moving ? n + 1 : 0);
+    state.SetIterationTime((cpu_s() - begin_s) / scans);
+    allocations = scope.count() / static_cast<std::uint64_t>(scans);
+  }
+  state.counters["allocations"] = static_cast<double>(allocations);
+}
+
+void own(benchmark::State& state, const Case& c) {
+  OwnMap& map = own_map(c.pixels, c.range_m);
+  for (int n = 0; n <= kMovingScans; ++n) (void)scan_of(n, c.pixels, c.range_m);
+  measure(state, c, [&] { map.reset(); }, [&](int n) { map.integrate(scan_of(n, c.pixels, c.range_m), c.level); });
+}
+
+/// At coarse precision stock gets what its pipeline would give it: one mean point a cell, the averaging not counted.
+void stock(benchmark::State& state, const Case& c, StockMode mode) {
+  std::vector<StockScan> scans;
+  for (int n = 0; n <= (c.moving ? kMovingScans : 0); ++n)
+    scans.push_back(stock_scan(scan_of(n, c.pixels, c.range_m), c.level == 0 ? 0.0 : cell_size_m(c.level)));
+  std::unique_ptr<octomap::OcTree> tree;
+  measure(
+      state, c, [&] { tree = std::make_unique<octomap::OcTree>(cell_size_m(c.level)); },
+      [&](int n) { insert(*tree, scans[static_cast<std::size_t>(n)], mode); });
+  state.counters["bytes"] = static_cast<double>(tree->memoryUsage());
+}
+
+void add(const Case& c, bool all_modes) {
+  benchmark::RegisterBenchmark(name_of("own", c).c_str(), [c](benchmark::State& s) { own(s, c); })
+      ->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(1)->Repetitions(15)->ReportAggregatesOnly(false);
+  for (const StockMode mode : kModes) {
+    if (!all_modes && mode != StockMode::kPlain && mode != StockMode::kBoth) continue;
+    benchmark::RegisterBenchmark(name_of(std::string("stock_") + to_string(mode), c).c_str(),
+                                 [c, mode](benchmark::State& s) { stock(s, c, mode); })
+        ->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(1)->Repetitions(c.level == 0 ? 2 : 5);
+  }
+}
+
+/// Keeps the best time of each benchmark (the least disturbed one) and prints it once.
+class BestReporter final : public benchmark::BenchmarkReporter {
+ public:
+  bool ReportContext(const Context&) override { return true; }
+  void ReportRuns(const std::vector<Run>& runs) override {
+    std::string name;
+    double best_ms = kInfinity;
+    double allocations = 0.0;
+    for (const Run& run : runs) {
+      if (run.run_type != Run::RT_Iteration || run.error_occurred) continue;
+      name = run.run_name.function_name;
+      best_ms = std::min(best_ms, run.GetAdjustedRealTime());
+      allocations = run.counters.at("allocations").value;
+    }
+    if (name.empty()) return;
+    best_ms_[name] = best_ms;
+    allocations_[name] = allocations;
+    std::printf("%-48s %10.3f ms %12.0f allocations\n", name.c_str(), best_ms, allocations);
+    std::fflush(stdout);
+  }
+  [[nodiscard]] double ms(const std::string& name) const {
+    const auto found = best_ms_.find(name);
+    return found == best_ms_.end() ? std::nan("") : found->second;
+  }
+  [[nodiscard]] double best_stock_ms(const Case& c) const {
+    double best = kInfinity;
+    for (const StockMode mode : kModes) best = std::fmin(best, ms(name_of(std::string("stock_") + to_string(mode), c)));
+    return best;
+  }
+  [[nodiscard]] double own_allocations() const {
+    double most = 0.0;
+    for (const auto& [name, count] : allocations_)
+      if (name.rfind("own", 0) == 0) most = std::max(most, count);
+    return most;
+  }
+
+ private:
+  std::map<std::string, double> best_ms_, allocations_;
+};
+
+Agreement agreement(int range_m) {
+  const Scan& scan = scan_of(0, 128, range_m);
+  OwnMap& map = own_map(128, range_m);
+  map.reset();
+  map.integrate(scan, 0);
+  octomap::OcTree tree(kFinestCell_m);
+  insert(tree, stock_scan(scan, 0.0), StockMode::kPlain);
+  const Agreement result = compare(tree, map.view(), pillar_world(), scan.p_WB(), 1.8 * range_m);
+  std::printf("agreement at %d m: occupied %.5f of %zu, free %.5f of %zu; false free: own %zu of %zu, stock %zu\n", range_m,
+              result.occupied_ratio, result.stock_occupied, result.free_ratio, result.stock_free, result.own_false_free,
+              result.own_free, result.stock_false_free);
+  return result;
+}
+
+}  // namespace
+}  // namespace roborun::bench
+
+int main(int argc, char** argv) {
+  using namespace roborun::bench;
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+  for (const int range_m : {20, 40})
+    for (int level = 0; level < roborun::kPrecisionLevels; ++level) add({level, range_m, 128, false}, true);
+  for (const int range_m : {20, 40}) add({0, range_m, 128, true}, false);
+  for (const int pixels : {64, 256}) add({0, 20, pixels, false}, false);
+  BestReporter reporter;
+  benchmark::RunSpecifiedBenchmarks(&reporter);
+
+  const Agreement near = agreement(20), far = agreement(40);
+  double worst = kInfinity;
+  for (const int range_m : {20, 40})
+    for (int level = 0; level < roborun::kPrecisionLevels; ++level) {
+      const Case c{level, range_m, 128, false};
+      worst = std::fmin(worst, reporter.best_stock_ms(c) / reporter.ms(name_of("own", c)));
+    }
+  const auto own_ms = [&](int level, int range_m) { return reporter.ms(name_of("own", {level, range_m, 128, false})); };
+  const auto plain = [&](int range_m) {
+    return reporter.ms(name_of("stock_plain", {0, range_m, 128, false})) / own_ms(0, range_m);
+  };
+  const auto best = [&](int range_m) { return reporter.best_stock_ms({0, range_m, 128, false}) / own_ms(0, range_m); };
+  std::printf(
+      "{\"speedup_plain_20m\":%.1f,\"speedup_plain_40m\":%.1f,\"speedup_best_20m\":%.1f,\"speedup_best_40m\":%.1f,"
+      "\"coarse_cost_ratio\":%.3f,\"worst_speedup_best_any_p0\":%.2f,\"allocations\":%.0f,\"bytes_per_cell\":%.2f,"
+      "\"occupied_agreement\":%.5f,\"free_agreement\":%.5f,\"false_free_vs_stock\":%.4f}\n",
+      plain(20), plain(40), best(20), best(40), std::fmax(own_ms(4, 20) / own_ms(0, 20), own_ms(4, 40) / own_ms(0, 40)),
+      worst, reporter.own_allocations(), 0.0, std::fmin(near.occupied_ratio, far.occupied_ratio),
+      std::fmin(near.free_ratio, far.free_ratio),
+      static_cast<double>(near.own_false_free + far.own_false_free) /
+          static_cast<double>(std::max<std::size_t>(near.stock_false_free + far.stock_false_free, 1)));
+  return 0;
+}
