@@ -48,15 +48,21 @@ struct Brick {
   std::uint16_t known_count{};                       ///< Cells that are not unknown.
   bool dirty{};                                      ///< Cells changed since refresh().
 
-  void clear(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
+  /// All cells become `value`: kUnknown or kFree.
+  void fill(std::int8_t value) noexcept;
   /// Derives mip and known_count from cell. O(4096).
   void refresh() noexcept;
   /// Flags of the cell of `level` (0 .. 4) with this Morton index. After refresh(). O(1).
   [[nodiscard]] std::uint8_t flags(int level, std::uint32_t morton) const noexcept;
-  /// Free evidence for all cells below (level, morton).
-  void add_free(int level, std::uint32_t morton) noexcept;
+  /// Free evidence for the blocks of `level` with Morton index 8 * parent + i, for each bit i of `blocks`.
+  void add_free(int level, std::uint32_t parent, std::uint8_t blocks) noexcept;
   /// A surface in this cell of level 0.
   void add_hit(std::uint32_t morton) noexcept;
+
+ private:
+  [[nodiscard]] std::uint64_t load(std::size_t first) const noexcept;
+  /// Free evidence for those of eight cells whose bytes are set in `selected`.
+  void free_eight(std::size_t first, std::uint64_t selected) noexcept;
 };
 
 /// Index of an entry in Brick::mip; level 1 .. 4.

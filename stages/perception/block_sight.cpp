@@ -1,0 +1,324 @@
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "stages/perception/block_sight.cpp"  // this file is compiled once an instruction set
+#include <hwy/foreach_target.h>
+// After foreach_target.
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/precision.hpp"
+#include "stages/perception/block_sight.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace roborun::stages::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using Floats = hn::CappedTag<float, 8>;
+using Ints = hn::RebindToSigned<Floats>;
+
+constexpr float kNear_m = 1e-3F;  // a block that reaches behind the camera is projected from here on
+
+struct Lanes {
+  alignas(32) float x[8];
+  alignas(32) float y[8];
+  alignas(32) float z[8];
+};
+
+struct Marks {
+  unsigned free{0}, mixed{0}, blocked{0}, outside{0}, covered{0};
+};
+
+struct Rectangles {
+  alignas(32) std::int32_t u0[8];
+  alignas(32) std::int32_t u1[8];
+  alignas(32) std::int32_t v0[8];
+  alignas(32) std::int32_t v1[8];
+  alignas(32) std::int32_t needed[8];
+  alignas(32) std::int32_t nearest[8];
+};
+
+template <class Mask>
+HWY_INLINE unsigned bits_of(Mask mask) {
+  std::uint8_t bytes[8] = {};
+  (void)hn::StoreMaskBits(Floats(), mask, bytes);
+  return bytes[0];
+}
+
+/// Half the width of a block's image around its centre's tangent: |d/dx y/x| summed over the cube's axes, an upper bound
+/// because the denominator is the nearest depth.
+template <class V>
+HWY_INLINE V half_width(const SightCamera& c, std::size_t row, V tangent, V half_over_near) {
+  const Floats d;
+  V sum = hn::Zero(d);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    sum = hn::Add(sum, hn::Abs(hn::Sub(hn::Set(d, c.R_CW[3 * row + axis]), hn::Mul(tangent, hn::Set(d, c.R_CW[axis])))));
+  return hn::Mul(sum, half_over_near);
+}
+
+template <class V>
+HWY_INLINE void store_pixels(V low, V high, float scale, float last, V keep, std::int32_t* first, std::int32_t* end) {
+  const Floats d;
+  const V limit = hn::Set(d, last);
+  const auto pixel = [&](V tangent) {
+    return hn::ConvertTo(Ints(), hn::And(keep, hn::Min(hn::Max(hn::Mul(tangent, hn::Set(d, scale)), hn::Zero(d)), limit)));
+  };
+  hn::Store(pixel(low), Ints(), first);
+  hn::Store(pixel(high), Ints(), end);
+}
+
+HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Marks& marks) {
+  const Floats d;
+  const Ints di;
+  Rectangles r;
+  const auto set = [&](float value) { return hn::Set(d, value); };
+  unsigned outside = 0, inside = 0, straddling = 0;
+  auto longest = hn::Set(di, 0);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    const auto x = hn::Load(d, at.x + i);
+    const auto y = hn::Load(d, at.y + i);
+    const auto z = hn::Load(d, at.z + i);
+    const auto reach = set(half_m * c.extent);
+    const auto far = hn::Add(x, reach);
+    const auto near = hn::Sub(x, reach);
+    const auto side = hn::Mul(x, set(c.tan_half));
+    const auto left = hn::Sub(side, y), right = hn::Add(side, y);
+    const auto up = hn::Sub(side, z), down = hn::Add(side, z);
+    const auto s0 = set(half_m * c.support[0]), s1 = set(half_m * c.support[1]);
+    const auto s2 = set(half_m * c.support[2]), s3 = set(half_m * c.support[3]);
+    const auto zero = hn::Zero(d);
+    const auto seen = hn::Min(hn::Min(hn::Add(left, s0), hn::Add(right, s1)), hn::Min(hn::Add(up, s2), hn::Add(down, s3)));
+    const auto all = hn::Min(hn::Min(hn::Sub(left, s0), hn::Sub(right, s1)), hn::Min(hn::Sub(up, s2), hn::Sub(down, s3)));
+    const auto is_outside = hn::Or(hn::Le(seen, zero), hn::Le(far, set(kNear_m)));
+    const auto is_straddling = hn::Le(near, set(kNear_m));
+    outside |= bits_of(is_outside) << i;
+    straddling |= bits_of(is_straddling) << i;
+    inside |= bits_of(hn::Ge(all, zero)) << i;
+    const auto skip = hn::Or(is_outside, is_straddling);
+    const auto keep = hn::IfThenZeroElse(skip, hn::BitCast(d, hn::Set(di, -1)));
+    const auto depth = hn::IfThenElse(skip, set(1.0F), x);
+    const auto inverse = hn::Div(set(1.0F), depth);
+    const auto half_over_near = hn::Div(set(half_m), hn::IfThenElse(skip, set(1.0F), near));
+    const auto u = hn::Mul(y, inverse);
+    const auto v = hn::Mul(z, inverse);
+    const auto du = half_width(c, 1, u, half_over_near);
+    const auto dv = half_width(c, 2, v, half_over_near);
+    const auto u_middle = hn::Sub(set(c.tan_half), u);
+    const auto v_middle = hn::Sub(set(c.tan_half), v);
+    store_pixels(hn::Sub(u_middle, du), hn::Add(u_middle, du), c.columns_per_tan, c.last_column, keep, r.u0 + i, r.u1 + i);
+    store_pixels(hn::Sub(v_middle, dv), hn::Add(v_middle, dv), c.rows_per_tan, c.last_row, keep, r.v0 + i, r.v1 + i);
+    const auto span = [&](const std::int32_t* first, const std::int32_t* last) {
+      return hn::Sub(hn::Load(di, last + i), hn::Load(di, first + i));
+    };
+    longest = hn::Max(longest, hn::Max(span(r.u0, r.u1), span(r.v0, r.v1)));
+    // What the camera calls empty up to its range is believed up to the range itself: no margin there.
+    const auto margin = hn::Add(set(c.margin_m), hn::Mul(set(c.margin_per_m2), hn::Mul(far, far)));
+    const auto needed = hn::Min(hn::Add(far, margin), hn::Max(far, set(c.range_m)));
+    const auto steps = set(c.pyramid->steps_per_m());
+    const auto most_steps = set(2.0F * static_cast<float>(DepthPyramid::kMaxSteps));
+    hn::Store(hn::Add(hn::ConvertTo(di, hn::Min(hn::Mul(needed, steps), most_steps)), hn::Set(di, 1)), di, r.needed + i);
+    hn::Store(hn::ConvertTo(di, hn::Min(hn::Max(hn::Mul(near, steps), zero), most_steps)), di, r.nearest + i);
+  }
+  const unsigned looked = ~(outside | straddling) & 0xFFU;
+  marks.outside = outside;
+  marks.mixed |= straddling & ~outside;
+  if (looked == 0) return;
+
+  // One level for all eight blocks, so that the result does not depend on how many are done at once.
+  const std::int32_t side = hn::GetLane(hn::MaxOfLanes(di, longest)) + 1;
+  const DepthPyramid::Level& level = c.pyramid->level(DepthPyramid::level_for(side));
+  const auto* entries = reinterpret_cast<const std::int32_t*>(level.entry);
+  unsigned sees_past = 0, hidden = 0;
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    const auto first = [&](const std::int32_t* from) { return hn::ShiftRightSame(hn::Load(di, from + i), level.shift); };
+    const auto last = [&](const std::int32_t* to) {
+      const auto past = hn::Add(hn::Load(di, to + i), hn::Set(di, 1 << level.shift));
+      return hn::Sub(hn::ShiftRightSame(past, level.shift), hn::Set(di, level.back));
+    };
+    const auto x0 = first(r.u0), x1 = hn::Max(last(r.u1), x0);
+    const auto width = hn::Set(di, level.width);
+    const auto row0 = first(r.v0), row1 = hn::Max(last(r.v1), row0);
+    const auto y0 = hn::Mul(row0, width), y1 = hn::Mul(row1, width);
+    const auto e0 = hn::GatherIndex(di, entries, hn::Add(x0, y0)), e1 = hn::GatherIndex(di, entries, hn::Add(x1, y0));
+    const auto e2 = hn::GatherIndex(di, entries, hn::Add(x0, y1)), e3 = hn::GatherIndex(di, entries, hn::Add(x1, y1));
+    const auto low = [&](auto entry) { return hn::And(entry, hn::Set(di, 0xFFFF)); };
+    const auto least = hn::Min(hn::Min(low(e0), low(e1)), hn::Min(low(e2), low(e3)));
+    // The upper half decides a comparison of whole words.
+    const auto most = hn::Sub(hn::Set(di, DepthPyramid::kMaxSteps),
+                              hn::ShiftRight<16>(hn::Min(hn::Min(e0, e1), hn::Min(e2, e3))));
+    const auto bits = [&](auto mask) { return bits_of(hn::RebindMask(d, mask)) << i; };
+    sees_past |= bits(hn::Gt(least, hn::Sub(hn::Load(di, r.needed + i), hn::Set(di, 1))));
+    hidden |= bits(hn::Gt(hn::Add(hn::Load(di, r.nearest + i), hn::Set(di, 1)), most));
+  }
+  sees_past &= looked;
+  hidden &= looked & ~sees_past;
+  marks.free |= sees_past;
+  marks.covered |= sees_past & inside;
+  marks.blocked |= hidden & inside;
+  marks.mixed |= looked & ~sees_past & ~hidden;
+}
+
+/// Eight blocks, with their positions in the frame of each camera.
+HWY_INLINE EightSeen combine(const SightCameras& cameras, unsigned set, int level, const Lanes* at) {
+  const auto half_m = static_cast<float>(0.5 * cell_size_m(level));
+  Marks marks;
+  EightSeen seen;
+  for (std::size_t k = 0; k < cameras.count; ++k) {
+    if (((set >> k) & 1U) == 0) continue;
+    see_with(cameras.camera[k], half_m, at[k], marks);
+    const unsigned can_see = ~marks.outside & 0xFFU;
+    for (unsigned i = 0; i < 8; ++i)
+      seen.cameras[i] = static_cast<std::uint8_t>(seen.cameras[i] | (((can_see >> i) & 1U) << k));
+  }
+  // Seen as free by one camera and as hidden by another that sees all of it: they disagree, and always will.
+  const unsigned covered = cameras.complete ? 0xFFU : marks.covered;
+  seen.free = static_cast<std::uint8_t>(marks.free & ~marks.mixed & ~marks.blocked & covered);
+  seen.mixed = static_cast<std::uint8_t>((marks.mixed | (marks.free & ~covered)) & ~marks.blocked);
+  return seen;
+}
+
+struct Node {
+  std::uint16_t morton;
+  std::uint8_t level;
+  std::uint8_t cameras;
+  std::array<std::array<float, 3>, kMaxCameras> p_C;
+};
+
+HWY_INLINE std::array<float, 3> in_camera(const SightCamera& c, const Vector3& p_W) {
+  const Vector3 offset_W = p_W - c.p_WC;
+  std::array<float, 3> p_C{};
+  for (std::size_t row = 0; row < 3; ++row) {
+    p_C[row] = c.R_CW[3 * row] * static_cast<float>(offset_W.x()) + c.R_CW[3 * row + 1] * static_cast<float>(offset_W.y()) +
+               c.R_CW[3 * row + 2] * static_cast<float>(offset_W.z());
+  }
+  return p_C;
+}
+
+/// The children of a node, in the frame of each camera.
+HWY_INLINE void place_children(const SightCameras& cameras, const Node& node, Lanes* at) {
+  const auto quarter_m = static_cast<float>(0.25 * cell_size_m(node.level));
+  for (std::size_t k = 0; k < cameras.count; ++k) {
+    if (((node.cameras >> k) & 1U) == 0) continue;
+    const SightCamera& c = cameras.camera[k];
+    float* const lane[3] = {at[k].x, at[k].y, at[k].z};
+    for (std::size_t row = 0; row < 3; ++row) {
+      const float a = quarter_m * c.R_CW[3 * row], b = quarter_m * c.R_CW[3 * row + 1], e = quarter_m * c.R_CW[3 * row + 2];
+      const float p = node.p_C[k][row];
+      for (unsigned i = 0; i < 8; ++i)
+        lane[row][i] = p + ((i & 1U) != 0 ? a : -a) + ((i & 2U) != 0 ? b : -b) + ((i & 4U) != 0 ? e : -e);
+    }
+  }
+}
+
+HWY_INLINE Node node_of(const SightCameras& cameras, const SightBlock& block) {
+  Node node{};
+  node.level = static_cast<std::uint8_t>(block.level);
+  node.cameras = block.cameras;
+  for (std::size_t k = 0; k < cameras.count; ++k) node.p_C[k] = in_camera(cameras.camera[k], block.center_W);
+  return node;
+}
+
+EightSeen SeeBlocks(const SightCameras& cameras, int level, const std::array<Vector3, 8>& center_W) {
+  Lanes at[kMaxCameras];
+  for (std::size_t k = 0; k < cameras.count; ++k) {
+    for (std::size_t i = 0; i < 8; ++i) {
+      const std::array<float, 3> p_C = in_camera(cameras.camera[k], center_W[i]);
+      at[k].x[i] = p_C[0];
+      at[k].y[i] = p_C[1];
+      at[k].z[i] = p_C[2];
+    }
+  }
+  return combine(cameras, 0xFFU, level, at);
+}
+
+EightSeen SeeChildren(const SightCameras& cameras, const SightBlock& parent) {
+  Lanes at[kMaxCameras];
+  const Node node = node_of(cameras, parent);
+  place_children(cameras, node, at);
+  return combine(cameras, node.cameras, node.level - 1, at);
+}
+
+void SeeBrick(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) {
+  // Depth first: at most seven siblings wait on each of four levels.
+  std::array<Node, 29> stack;
+  Lanes at[kMaxCameras];
+  stack[0] = node_of(cameras, brick);
+  std::size_t depth = 1;
+  seen.count = 0;
+  seen.visited = 0;
+  while (depth > 0 && seen.visited < BrickSeen::kMaxGroups) {
+    const Node node = stack[--depth];
+    ++seen.visited;
+    place_children(cameras, node, at);
+    const int level = node.level - 1;
+    const EightSeen eight = combine(cameras, node.cameras, level, at);
+    if (eight.free != 0)
+      seen.group[seen.count++] = {node.morton, static_cast<std::uint8_t>(level), eight.free};
+    if (level <= finest) continue;
+    for (unsigned i = 0; i < 8; ++i) {
+      if (((eight.mixed >> i) & 1U) == 0) continue;
+      Node& child = stack[depth++];
+      child.morton = static_cast<std::uint16_t>(8U * node.morton + i);
+      child.level = static_cast<std::uint8_t>(level);
+      child.cameras = eight.cameras[i];
+      for (std::size_t k = 0; k < cameras.count; ++k) {
+        if (((child.cameras >> k) & 1U) != 0) child.p_C[k] = {at[k].x[i], at[k].y[i], at[k].z[i]};
+      }
+    }
+  }
+}
+
+}  // namespace roborun::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace roborun::stages {
+
+HWY_EXPORT(SeeBlocks);
+HWY_EXPORT(SeeChildren);
+HWY_EXPORT(SeeBrick);
+
+void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& image, const Margin& depth_margin) noexcept {
+  const Matrix3 R = posed.X_WC.R_RT.transpose();
+  const auto t = static_cast<double>(posed.frame.tan_half_fov_ratio);
+  p_WC = posed.X_WC.p_RT;
+  const auto sum_abs = [&R, t](double of_x, int row, double of_row) {
+    double sum = 0.0;
+    for (int i = 0; i < 3; ++i) sum += std::fabs(of_x * t * R(0, i) + of_row * R(row, i));
+    return static_cast<float>(sum);
+  };
+  for (int i = 0; i < 9; ++i) R_CW[static_cast<std::size_t>(i)] = static_cast<float>(R(i / 3, i % 3));
+  extent = sum_abs(0.0, 0, 1.0);
+  support = {sum_abs(1.0, 1, -1.0), sum_abs(1.0, 1, 1.0), sum_abs(1.0, 2, -1.0), sum_abs(1.0, 2, 1.0)};
+  tan_half = posed.frame.tan_half_fov_ratio;
+  range_m = posed.frame.range_m;
+  columns_per_tan = static_cast<float>(0.5 * posed.frame.width / t);
+  rows_per_tan = static_cast<float>(0.5 * posed.frame.height / t);
+  last_column = static_cast<float>(posed.frame.width - 1);
+  last_row = static_cast<float>(posed.frame.height - 1);
+  margin_m = static_cast<float>(depth_margin.constant_m);
+  margin_per_m2 = static_cast<float>(depth_margin.per_m2);
+  pyramid = &image;
+}
+
+EightSeen see_blocks(const SightCameras& cameras, int level, const std::array<Vector3, 8>& center_W) noexcept {
+  return HWY_DYNAMIC_DISPATCH(SeeBlocks)(cameras, level, center_W);
+}
+
+EightSeen see_children(const SightCameras& cameras, const SightBlock& parent) noexcept {
+  return HWY_DYNAMIC_DISPATCH(SeeChildren)(cameras, parent);
+}
+
+void see_brick(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) noexcept {
+  HWY_DYNAMIC_DISPATCH(SeeBrick)(cameras, brick, finest, seen);
+}
+
+std::int64_t sight_instruction_sets() noexcept { return hwy::SupportedTargets(); }
+
+void use_sight_instruction_sets(std::int64_t sets) noexcept {
+  hwy::SetSupportedTargetsForTest(sets == ~std::int64_t{0} ? 0 : sets);
+  hwy::GetChosenTarget().DeInit();
+}
+
+}  // namespace roborun::stages
+#endif  // HWY_ONCE

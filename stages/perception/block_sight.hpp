@@ -1,0 +1,81 @@
+/// Which blocks of space do the cameras of one scan see through? Eight blocks at a time, with the widest vector
+/// instructions of the machine; the same bits on all of them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "stages/perception/depth_pyramid.hpp"
+
+namespace roborun::stages {
+
+inline constexpr std::size_t kMaxCameras = 8;
+
+/// A camera and its image, prepared for see_*(). Single precision: positions are relative to the camera.
+struct SightCamera {
+  /// `depth_margin`: a block is free only if every pixel sees constant_m + per_m2 * depth^2 past it.
+  struct Margin {
+    double constant_m{};
+    double per_m2{};
+  };
+  void prepare(const PosedDepthFrame& posed, const DepthPyramid& image, const Margin& depth_margin) noexcept;
+
+  Vector3 p_WC = Vector3::Zero();
+  std::array<float, 9> R_CW{};    ///< Row-major.
+  float extent{};  ///< Half extent of a cube of half-edge 1 along the optical axis.
+  std::array<float, 4> support{};  ///< The same against the four sides of the field of view: left, right, up, down.
+  float tan_half{}, range_m{};
+  float columns_per_tan{}, rows_per_tan{}, last_column{}, last_row{};
+  float margin_m{}, margin_per_m2{};
+  const DepthPyramid* pyramid{};
+};
+
+struct SightCameras {
+  std::array<SightCamera, kMaxCameras> camera{};
+  std::size_t count{0};
+  bool complete{false};  ///< All cameras of the vehicle: what lies between two images is seen by them together.
+};
+
+/// Eight blocks of one size. `free`: seen past, all over, and no camera disagrees. `mixed`: smaller blocks may
+/// be free. Bit i is block i.
+struct EightSeen {
+  std::uint8_t free{}, mixed{};
+  std::array<std::uint8_t, 8> cameras{};  ///< For each block, the set of cameras that can see some of it.
+};
+
+/// A block and the cameras that can see some of it.
+struct SightBlock {
+  Vector3 center_W = Vector3::Zero();
+  int level{};
+  std::uint8_t cameras{};
+};
+
+/// Free blocks of a brick: bit i of `free` is the block of `level` with Morton index 8 * parent + i.
+struct FreeGroup {
+  std::uint16_t parent;
+  std::uint8_t level;
+  std::uint8_t free;
+};
+/// One group for each block of level 4 .. 1 that had to be divided.
+struct BrickSeen {
+  static constexpr std::size_t kMaxGroups = 1 + 8 + 64 + 512;
+  std::array<FreeGroup, kMaxGroups> group;
+  std::size_t count{0};
+  std::uint32_t visited{0};  ///< Blocks divided.
+};
+
+/// Blocks of any position. RT-safe: O(cameras).
+[[nodiscard]] EightSeen see_blocks(const SightCameras& cameras, int level,
+                                   const std::array<Vector3, 8>& center_W) noexcept;
+/// The eight children of a block, in Morton order. RT-safe: O(cameras).
+[[nodiscard]] EightSeen see_children(const SightCameras& cameras, const SightBlock& parent) noexcept;
+/// Divides a brick (level 4) down to blocks of level `finest` (0 .. 3). RT-safe: at most kMaxGroups times
+/// see_children().
+void see_brick(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) noexcept;
+
+/// Instruction sets that see_*() can use here, and the use of one of them only (tests); all again with ~0.
+[[nodiscard]] std::int64_t sight_instruction_sets() noexcept;
+void use_sight_instruction_sets(std::int64_t sets) noexcept;
+
+}  // namespace roborun::stages
