@@ -1,3 +1,5 @@
+// Eight lanes are all there is to do: wider registers were slower than AVX2.
+#define HWY_DISABLED_TARGETS (HWY_AVX3 | HWY_AVX3_DL)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "stages/perception/block_sight.cpp"  // this file is compiled once an instruction set
 #include <hwy/foreach_target.h>
@@ -36,7 +38,26 @@ struct Rectangles {
   alignas(32) std::int32_t v1[8];
   alignas(32) std::int32_t needed[8];
   alignas(32) std::int32_t nearest[8];
+  alignas(32) std::int32_t corner[4][8];
+  alignas(32) std::int32_t entry[8];
 };
+
+/// The minimum of four entries. Single loads: gather instructions are slow where they are patched against leaks.
+HWY_INLINE void store_least(const DepthPyramid::Entry* entry, std::int32_t a, std::int32_t b, std::int32_t c, std::int32_t e,
+                            std::int32_t* to) {
+#if HWY_TARGET == HWY_SCALAR
+  std::int16_t least = DepthPyramid::kMaxSteps, not_most = DepthPyramid::kMaxSteps;
+  for (const std::int32_t i : {a, b, c, e}) {
+    least = std::min(least, entry[i].least_steps);
+    not_most = std::min(not_most, entry[i].not_most_steps);
+  }
+  *to = least | (static_cast<std::int32_t>(not_most) << 16U);
+#else
+  const hn::CappedTag<std::int16_t, 2> pair;
+  const auto at = [&](std::int32_t i) { return hn::LoadU(pair, &entry[i].least_steps); };
+  hn::StoreU(hn::Min(hn::Min(at(a), at(b)), hn::Min(at(c), at(e))), pair, reinterpret_cast<std::int16_t*>(to));
+#endif
+}
 
 template <class Mask>
 HWY_INLINE unsigned bits_of(Mask mask) {
@@ -127,7 +148,6 @@ HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Ma
   // One level for all eight blocks, so that the result does not depend on how many are done at once.
   const std::int32_t side = hn::GetLane(hn::MaxOfLanes(di, longest)) + 1;
   const DepthPyramid::Level& level = c.pyramid->level(DepthPyramid::level_for(side));
-  const auto* entries = reinterpret_cast<const std::int32_t*>(level.entry);
   unsigned sees_past = 0, hidden = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     const auto first = [&](const std::int32_t* from) { return hn::ShiftRightSame(hn::Load(di, from + i), level.shift); };
@@ -139,13 +159,17 @@ HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Ma
     const auto width = hn::Set(di, level.width);
     const auto row0 = first(r.v0), row1 = hn::Max(last(r.v1), row0);
     const auto y0 = hn::Mul(row0, width), y1 = hn::Mul(row1, width);
-    const auto e0 = hn::GatherIndex(di, entries, hn::Add(x0, y0)), e1 = hn::GatherIndex(di, entries, hn::Add(x1, y0));
-    const auto e2 = hn::GatherIndex(di, entries, hn::Add(x0, y1)), e3 = hn::GatherIndex(di, entries, hn::Add(x1, y1));
-    const auto low = [&](auto entry) { return hn::And(entry, hn::Set(di, 0xFFFF)); };
-    const auto least = hn::Min(hn::Min(low(e0), low(e1)), hn::Min(low(e2), low(e3)));
-    // The upper half decides a comparison of whole words.
-    const auto most = hn::Sub(hn::Set(di, DepthPyramid::kMaxSteps),
-                              hn::ShiftRight<16>(hn::Min(hn::Min(e0, e1), hn::Min(e2, e3))));
+    hn::Store(hn::Add(x0, y0), di, r.corner[0] + i);
+    hn::Store(hn::Add(x1, y0), di, r.corner[1] + i);
+    hn::Store(hn::Add(x0, y1), di, r.corner[2] + i);
+    hn::Store(hn::Add(x1, y1), di, r.corner[3] + i);
+  }
+  for (std::size_t i = 0; i < 8; ++i)
+    store_least(level.entry, r.corner[0][i], r.corner[1][i], r.corner[2][i], r.corner[3][i], r.entry + i);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    const auto entry = hn::Load(di, r.entry + i);
+    const auto least = hn::And(entry, hn::Set(di, 0xFFFF));
+    const auto most = hn::Sub(hn::Set(di, DepthPyramid::kMaxSteps), hn::ShiftRight<16>(entry));
     const auto bits = [&](auto mask) { return bits_of(hn::RebindMask(d, mask)) << i; };
     sees_past |= bits(hn::Gt(least, hn::Sub(hn::Load(di, r.needed + i), hn::Set(di, 1))));
     hidden |= bits(hn::Gt(hn::Add(hn::Load(di, r.nearest + i), hn::Set(di, 1)), most));
@@ -158,22 +182,39 @@ HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Ma
   marks.mixed |= looked & ~sees_past & ~hidden;
 }
 
-/// Eight blocks, with their positions in the frame of each camera.
-HWY_INLINE EightSeen combine(const SightCameras& cameras, unsigned set, int level, const Lanes* at) {
+struct Combined {
+  unsigned free, mixed;
+  std::array<unsigned, kMaxCameras> outside;
+};
+
+/// Eight blocks, with their positions in the frame of each camera of the set.
+HWY_INLINE void combine(const SightCameras& cameras, unsigned set, int level, const Lanes* at, Combined& result) {
   const auto half_m = static_cast<float>(0.5 * cell_size_m(level));
   Marks marks;
-  EightSeen seen;
-  for (std::size_t k = 0; k < cameras.count; ++k) {
-    if (((set >> k) & 1U) == 0) continue;
+  for (unsigned rest = set; rest != 0; rest &= rest - 1) {
+    const auto k = static_cast<std::size_t>(__builtin_ctz(rest));
     see_with(cameras.camera[k], half_m, at[k], marks);
-    const unsigned can_see = ~marks.outside & 0xFFU;
-    for (unsigned i = 0; i < 8; ++i)
-      seen.cameras[i] = static_cast<std::uint8_t>(seen.cameras[i] | (((can_see >> i) & 1U) << k));
+    result.outside[k] = marks.outside;
   }
   // Seen as free by one camera and as hidden by another that sees all of it: they disagree, and always will.
   const unsigned covered = cameras.complete ? 0xFFU : marks.covered;
-  seen.free = static_cast<std::uint8_t>(marks.free & ~marks.mixed & ~marks.blocked & covered);
-  seen.mixed = static_cast<std::uint8_t>((marks.mixed | (marks.free & ~covered)) & ~marks.blocked);
+  result.free = marks.free & ~marks.mixed & ~marks.blocked & covered;
+  result.mixed = (marks.mixed | (marks.free & ~covered)) & ~marks.blocked;
+}
+
+/// The cameras of the set that can see some of block i.
+HWY_INLINE std::uint8_t cameras_of(const Combined& combined, unsigned set, unsigned i) {
+  unsigned can_see = 0;
+  for (unsigned rest = set; rest != 0; rest &= rest - 1) {
+    const auto k = static_cast<unsigned>(__builtin_ctz(rest));
+    can_see |= (~(combined.outside[k] >> i) & 1U) << k;
+  }
+  return static_cast<std::uint8_t>(can_see);
+}
+
+HWY_INLINE EightSeen summary(const Combined& combined, unsigned set) {
+  EightSeen seen{static_cast<std::uint8_t>(combined.free), static_cast<std::uint8_t>(combined.mixed), {}};
+  for (unsigned i = 0; i < 8; ++i) seen.cameras[i] = cameras_of(combined, set, i);
   return seen;
 }
 
@@ -196,16 +237,16 @@ HWY_INLINE std::array<float, 3> in_camera(const SightCamera& c, const Vector3& p
 
 /// The children of a node, in the frame of each camera.
 HWY_INLINE void place_children(const SightCameras& cameras, const Node& node, Lanes* at) {
-  const auto quarter_m = static_cast<float>(0.25 * cell_size_m(node.level));
-  for (std::size_t k = 0; k < cameras.count; ++k) {
-    if (((node.cameras >> k) & 1U) == 0) continue;
-    const SightCamera& c = cameras.camera[k];
+  const Floats d;
+  const auto quarter = hn::Set(d, static_cast<float>(0.25 * cell_size_m(node.level)));
+  for (unsigned set = node.cameras; set != 0; set &= set - 1) {
+    const auto k = static_cast<std::size_t>(__builtin_ctz(set));
     float* const lane[3] = {at[k].x, at[k].y, at[k].z};
     for (std::size_t row = 0; row < 3; ++row) {
-      const float a = quarter_m * c.R_CW[3 * row], b = quarter_m * c.R_CW[3 * row + 1], e = quarter_m * c.R_CW[3 * row + 2];
-      const float p = node.p_C[k][row];
-      for (unsigned i = 0; i < 8; ++i)
-        lane[row][i] = p + ((i & 1U) != 0 ? a : -a) + ((i & 2U) != 0 ? b : -b) + ((i & 4U) != 0 ? e : -e);
+      const float* const offset = cameras.camera[k].child[row].data();
+      const auto center = hn::Set(d, node.p_C[k][row]);
+      for (std::size_t i = 0; i < 8; i += hn::Lanes(d))
+        hn::Store(hn::Add(center, hn::Mul(quarter, hn::Load(d, offset + i))), d, lane[row] + i);
     }
   }
 }
@@ -228,14 +269,19 @@ EightSeen SeeBlocks(const SightCameras& cameras, int level, const std::array<Vec
       at[k].z[i] = p_C[2];
     }
   }
-  return combine(cameras, 0xFFU, level, at);
+  const unsigned all = (1U << cameras.count) - 1U;
+  Combined combined;
+  combine(cameras, all, level, at, combined);
+  return summary(combined, all);
 }
 
 EightSeen SeeChildren(const SightCameras& cameras, const SightBlock& parent) {
   Lanes at[kMaxCameras];
   const Node node = node_of(cameras, parent);
   place_children(cameras, node, at);
-  return combine(cameras, node.cameras, node.level - 1, at);
+  Combined combined;
+  combine(cameras, node.cameras, node.level - 1, at, combined);
+  return summary(combined, node.cameras);
 }
 
 void SeeBrick(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) {
@@ -246,25 +292,60 @@ void SeeBrick(const SightCameras& cameras, const SightBlock& brick, int finest, 
   std::size_t depth = 1;
   seen.count = 0;
   seen.visited = 0;
+  seen.free_cells = 0;
+  Combined combined;
   while (depth > 0 && seen.visited < BrickSeen::kMaxGroups) {
     const Node node = stack[--depth];
     ++seen.visited;
     place_children(cameras, node, at);
     const int level = node.level - 1;
-    const EightSeen eight = combine(cameras, node.cameras, level, at);
-    if (eight.free != 0)
-      seen.group[seen.count++] = {node.morton, static_cast<std::uint8_t>(level), eight.free};
+    combine(cameras, node.cameras, level, at, combined);
+    if (combined.free != 0) {
+      seen.group[seen.count++] = {node.morton, static_cast<std::uint8_t>(level), static_cast<std::uint8_t>(combined.free)};
+      seen.free_cells += static_cast<std::uint32_t>(__builtin_popcount(combined.free)) << (3U * static_cast<unsigned>(level));
+    }
     if (level <= finest) continue;
-    for (unsigned i = 0; i < 8; ++i) {
-      if (((eight.mixed >> i) & 1U) == 0) continue;
+    for (unsigned mixed = combined.mixed; mixed != 0; mixed &= mixed - 1) {
+      const auto i = static_cast<unsigned>(__builtin_ctz(mixed));
       Node& child = stack[depth++];
       child.morton = static_cast<std::uint16_t>(8U * node.morton + i);
       child.level = static_cast<std::uint8_t>(level);
-      child.cameras = eight.cameras[i];
-      for (std::size_t k = 0; k < cameras.count; ++k) {
-        if (((child.cameras >> k) & 1U) != 0) child.p_C[k] = {at[k].x[i], at[k].y[i], at[k].z[i]};
+      child.cameras = cameras_of(combined, node.cameras, i);
+      for (unsigned rest = child.cameras; rest != 0; rest &= rest - 1) {
+        const auto k = static_cast<std::size_t>(__builtin_ctz(rest));
+        child.p_C[k] = {at[k].x[i], at[k].y[i], at[k].z[i]};
       }
     }
+  }
+}
+
+void EndCells(const PixelLine& line, std::span<const float> depth_m, float range_m, SurfaceRow& row) {
+  const hn::CappedTag<float, 8> d;
+  const hn::RebindToSigned<decltype(d)> di;
+  const std::size_t count = depth_m.size();
+  constexpr std::int32_t kBias = 4096;  // makes truncation round down
+  std::int32_t* const out[3] = {row.x.data(), row.y.data(), row.z.data()};
+  const auto eight = [&](const float* depth, std::size_t u) {
+    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+      const auto z = hn::LoadU(d, depth + i);
+      const auto is_surface = hn::And(hn::Gt(z, hn::Zero(d)), hn::Lt(z, hn::Set(d, range_m)));
+      const auto far = hn::IfThenElseZero(is_surface, z);
+      const auto column = hn::ConvertTo(d, hn::Iota(di, static_cast<std::int32_t>(u + i)));
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto direction = hn::Add(hn::Set(d, line.first[axis]), hn::Mul(column, hn::Set(d, line.step[axis])));
+        const auto cells = hn::Add(hn::Mul(far, direction), hn::Set(d, line.rest_cells[axis] + static_cast<float>(kBias)));
+        auto cell = hn::Add(hn::ConvertTo(di, cells), hn::Set(di, line.origin_cells[axis] - kBias));
+        if (axis == 0) cell = hn::IfThenElse(hn::RebindMask(di, is_surface), cell, hn::Set(di, SurfaceRow::kNone));
+        hn::Store(cell, di, out[axis] + u + i);
+      }
+    }
+  };
+  std::size_t u = 0;
+  for (; u + 8 <= count; u += 8) eight(depth_m.data() + u, u);
+  if (u < count) {
+    float tail[8] = {};
+    for (std::size_t i = 0; u + i < count; ++i) tail[i] = depth_m[u + i];
+    eight(tail, u);
   }
 }
 
@@ -277,6 +358,7 @@ namespace roborun::stages {
 HWY_EXPORT(SeeBlocks);
 HWY_EXPORT(SeeChildren);
 HWY_EXPORT(SeeBrick);
+HWY_EXPORT(EndCells);
 
 void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& image, const Margin& depth_margin) noexcept {
   const Matrix3 R = posed.X_WC.R_RT.transpose();
@@ -288,6 +370,11 @@ void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& imag
     return static_cast<float>(sum);
   };
   for (int i = 0; i < 9; ++i) R_CW[static_cast<std::size_t>(i)] = static_cast<float>(R(i / 3, i % 3));
+  for (std::size_t i = 0; i < 8; ++i) {
+    const Vector3 offset_W((i & 1U) != 0 ? 1.0 : -1.0, (i & 2U) != 0 ? 1.0 : -1.0, (i & 4U) != 0 ? 1.0 : -1.0);
+    const Vector3 offset_C = R * offset_W;
+    for (std::size_t row = 0; row < 3; ++row) child[row][i] = static_cast<float>(offset_C[static_cast<Eigen::Index>(row)]);
+  }
   extent = sum_abs(0.0, 0, 1.0);
   support = {sum_abs(1.0, 1, -1.0), sum_abs(1.0, 1, 1.0), sum_abs(1.0, 2, -1.0), sum_abs(1.0, 2, 1.0)};
   tan_half = posed.frame.tan_half_fov_ratio;
@@ -311,6 +398,10 @@ EightSeen see_children(const SightCameras& cameras, const SightBlock& parent) no
 
 void see_brick(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) noexcept {
   HWY_DYNAMIC_DISPATCH(SeeBrick)(cameras, brick, finest, seen);
+}
+
+void end_cells(const PixelLine& line, std::span<const float> depth_m, float range_m, SurfaceRow& row) noexcept {
+  HWY_DYNAMIC_DISPATCH(EndCells)(line, depth_m, range_m, row);
 }
 
 std::int64_t sight_instruction_sets() noexcept { return hwy::SupportedTargets(); }

@@ -23,6 +23,7 @@ struct SightCamera {
 
   Vector3 p_WC = Vector3::Zero();
   std::array<float, 9> R_CW{};    ///< Row-major.
+  alignas(32) std::array<std::array<float, 8>, 3> child{};  ///< Centres of a block's children, for a quarter edge of 1.
   float extent{};  ///< Half extent of a cube of half-edge 1 along the optical axis.
   std::array<float, 4> support{};  ///< The same against the four sides of the field of view: left, right, up, down.
   float tan_half{}, range_m{};
@@ -62,7 +63,8 @@ struct BrickSeen {
   static constexpr std::size_t kMaxGroups = 1 + 8 + 64 + 512;
   std::array<FreeGroup, kMaxGroups> group;
   std::size_t count{0};
-  std::uint32_t visited{0};  ///< Blocks divided.
+  std::uint32_t visited{0};     ///< Blocks divided.
+  std::uint32_t free_cells{0};  ///< Of level 0, in all groups.
 };
 
 /// Blocks of any position. RT-safe: O(cameras).
@@ -73,6 +75,21 @@ struct BrickSeen {
 /// Divides a brick (level 4) down to blocks of level `finest` (0 .. 3). RT-safe: at most kMaxGroups times
 /// see_children().
 void see_brick(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) noexcept;
+
+/// Where the pixels of a row end, in cells of the finest level from the map's corner.
+struct SurfaceRow {
+  static constexpr std::int32_t kNone = -1;  ///< x of a pixel without a surface.
+  alignas(32) std::array<std::int32_t, DepthPyramid::kMaxPixels> x, y, z;
+};
+/// A row of an image as a line in cells: pixel u at depth d ends at origin_cells + d (first + u step).
+struct PixelLine {
+  std::array<std::int32_t, 3> origin_cells{};  ///< Whole cells, and
+  std::array<float, 3> rest_cells{};           ///< what is left.
+  std::array<float, 3> first{};
+  std::array<float, 3> step{};
+};
+/// Precondition: no more than kMaxPixels depths, range_m below 300 m. RT-safe: O(pixels).
+void end_cells(const PixelLine& line, std::span<const float> depth_m, float range_m, SurfaceRow& row) noexcept;
 
 /// Instruction sets that see_*() can use here, and the use of one of them only (tests); all again with ~0.
 [[nodiscard]] std::int64_t sight_instruction_sets() noexcept;

@@ -27,6 +27,7 @@ void Brick::fill(std::int8_t value) noexcept {
   cell.fill(value);
   mip.fill(value == evidence::kUnknown ? content::kUnknown : content::kFree);
   known_count = value == evidence::kUnknown ? 0 : kCellsPerBrick;
+  stale = false;
 }
 
 void Brick::refresh() noexcept {
@@ -56,7 +57,7 @@ void Brick::refresh() noexcept {
     to += count;
   }
   known_count = static_cast<std::uint16_t>(kCellsPerBrick - unknown_sum);
-  dirty = false;
+  stale = false;
 }
 
 std::uint8_t Brick::flags(int level, std::uint32_t morton) const noexcept {
@@ -85,7 +86,7 @@ void Brick::free_eight(std::size_t first, Word selected) noexcept {
 }
 
 void Brick::add_free(int level, std::uint32_t parent, std::uint8_t blocks) noexcept {
-  dirty = true;
+  stale = true;
   const std::size_t base = 8 * std::size_t{parent};
   if (level == 0) {
     free_eight(base, kSpreadBits[blocks]);
@@ -94,13 +95,20 @@ void Brick::add_free(int level, std::uint32_t parent, std::uint8_t blocks) noexc
   const std::size_t count = std::size_t{1} << (3U * static_cast<unsigned>(level));
   for (std::size_t i = 0; i < 8; ++i) {
     if (((blocks >> i) & 1U) == 0) continue;
-    for (std::size_t k = 0; k < count; k += 8) free_eight((base + i) * count + k, ~Word{0});
+    const std::size_t first = (base + i) * count;
+    Word occupied = 0;
+    for (std::size_t k = 0; k < count; k += 8) occupied |= ~load(first + k) & kSigns;
+    if (occupied == 0) {
+      std::memset(cell.data() + first, static_cast<unsigned char>(evidence::kFree), count);
+    } else {
+      for (std::size_t k = 0; k < count; k += 8) free_eight(first + k, ~Word{0});
+    }
   }
 }
 
 void Brick::add_hit(std::uint32_t morton) noexcept {
   cell[morton] = evidence::after_hit(cell[morton]);
-  dirty = true;
+  stale = true;
 }
 
 }  // namespace roborun::stages

@@ -46,7 +46,8 @@ struct Brick {
   std::array<std::uint8_t, 512 + 64 + 8 + 1> mip{};  ///< Levels 1 to 4, derived by refresh().
   std::int32_t x{}, y{}, z{};                        ///< Position in bricks from the map's corner.
   std::uint16_t known_count{};                       ///< Cells that are not unknown.
-  bool dirty{};                                      ///< Cells changed since refresh().
+  bool dirty{};                                      ///< Written to in this scan.
+  bool stale{};                                      ///< Cells changed since refresh().
 
   /// All cells become `value`: kUnknown or kFree.
   void fill(std::int8_t value) noexcept;

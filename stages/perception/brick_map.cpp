@@ -65,6 +65,15 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
   dirty_ = arena.take<std::uint32_t>(config.max_bricks);
   std::fill(slot_.begin(), slot_.end(), kUnknownBrick);
   free_brick_.fill(evidence::kFree);
+  const auto cell_at = [this](const Vector3& p_W) {
+    const Vector3 local = (p_W - corner_W_) / kFinestCell_m;
+    return Cell{static_cast<std::int32_t>(local.x()), static_cast<std::int32_t>(local.y()),
+                static_cast<std::int32_t>(local.z())};
+  };
+  low_ = cell_at(config.bounds_W.min_W);
+  high_ = cell_at(config.bounds_W.max_W);
+  high_ = {std::min(high_.x, nx_ * kBrickCells - 1), std::min(high_.y, ny_ * kBrickCells - 1),
+           std::min(high_.z, nz_ * kBrickCells - 1)};
   // Highest slot first, so that slots are handed out from 0 up.
   for (std::size_t i = 0; i < free_list_.size(); ++i) {
     free_list_[i] = static_cast<std::uint32_t>(free_list_.size() - 1 - i);
@@ -163,12 +172,18 @@ bool BrickMap::give_up_farthest() noexcept {
   return given_up > 0;
 }
 
+void BrickMap::refresh(Brick& brick) noexcept {
+  if (!brick.stale) return;
+  known_cells_ -= brick.known_count;
+  brick.refresh();
+  known_cells_ += brick.known_count;
+}
+
 void BrickMap::refresh_dirty() noexcept {
   for (std::size_t i = 0; i < dirty_count_; ++i) {
     Brick& b = brick_[dirty_[i]];
-    known_cells_ -= b.known_count;
-    b.refresh();
-    known_cells_ += b.known_count;
+    refresh(b);
+    b.dirty = false;
     if (b.flags(kBrickLevel, 0) != content::kFree) continue;
     slot_[slot_of(b.x, b.y, b.z)] = kFreeBrick;
     free_list_[free_count_++] = dirty_[i];

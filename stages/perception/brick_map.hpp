@@ -105,11 +105,13 @@ class BrickMap final : public OccupancyMap, private MapView {
   [[nodiscard]] bool brick_range_free(const Brick& brick, const Cell& low, const Cell& high,
                                       std::uint64_t& lookups) const noexcept;
   [[nodiscard]] Vector3 brick_center_W(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
+  void refresh(Brick& brick) noexcept;
   void refresh_dirty() noexcept;
 
   Config config_;
   Vector3 corner_W_;              ///< Of the map, a multiple of the coarsest cell.
   std::int32_t nx_, ny_, nz_;     ///< Bricks, even numbers.
+  Cell low_, high_;               ///< Cells of the bounds.
   std::span<std::int32_t> slot_;  ///< Brick of each position, or kUnknownBrick, or kFreeBrick.
   std::span<Brick> brick_;
   std::span<std::uint32_t> free_list_;
@@ -120,6 +122,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   std::size_t dirty_count_{0};
   SightCameras cameras_{};
   BrickSeen seen_{};
+  SurfaceRow row_{};
   Brick free_brick_{};  ///< What every position with kFreeBrick reads as.
   std::array<std::size_t, kMaxCameras> frame_of_{};
   std::array<std::optional<DepthPyramid>, kMaxCameras> pyramid_{};

@@ -17,8 +17,6 @@ constexpr double volume_m3(int level) noexcept {
 
 std::uint32_t in_brick(std::int32_t cell) noexcept { return static_cast<std::uint32_t>(cell & (kBrickCells - 1)); }
 
-unsigned count_bits(unsigned bits) noexcept { return static_cast<unsigned>(__builtin_popcount(bits)); }
-
 }  // namespace
 
 std::size_t BrickMap::usable_frames(const IntegrationRequest& request, IntegrationResult& result) noexcept {
@@ -126,16 +124,16 @@ bool BrickMap::clear_bricks(const Block& block, std::uint8_t cameras, int finest
       see_brick(cameras_, {brick_center_W(bx, by, bz), kBrickLevel, eight.cameras[static_cast<std::size_t>(child)]},
                 finest, seen_);
       work.units += seen_.visited;
+      work.volume_m3 += seen_.free_cells * volume_m3(0);
       Brick* brick = nullptr;
       const bool was_free = slot_[slot_of(bx, by, bz)] == kFreeBrick;
-      for (std::size_t i = 0; i < seen_.count; ++i) {
+      for (std::size_t i = 0; i < seen_.count && !was_free; ++i) {
         const FreeGroup& group = seen_.group[i];
-        work.volume_m3 += count_bits(group.free) * volume_m3(group.level);
-        if (was_free) continue;
         if (brick == nullptr) brick = touch(bx, by, bz);
         if (brick == nullptr) break;  // pool full, and nothing farther away to give up
         brick->add_free(group.level, group.parent, group.free);
       }
+      if (brick != nullptr) refresh(*brick);  // while it is in the cache
       if (budget.spent(work)) return false;
     }
   }
@@ -167,24 +165,43 @@ std::size_t BrickMap::clear_blocks(std::size_t count, const IntegrationRequest& 
 }
 
 void BrickMap::add_surfaces(const IntegrationRequest& request, double reach_m, core::Work& work) noexcept {
+  std::size_t last_position = slot_.size();
+  Brick* brick = nullptr;
+  Cell last{-1, -1, -1};
   for (std::size_t i = 0; i < cameras_.count; ++i) {
     const PosedDepthFrame& posed = request.frames[frame_of_[i]];
     const firmware_if::DepthFrame& frame = posed.frame;
-    const double t = static_cast<double>(frame.tan_half_fov_ratio);
+    const double pitch = 2.0 * static_cast<double>(frame.tan_half_fov_ratio);
+    const Vector3 origin = (posed.X_WC.p_RT - corner_W_) / kFinestCell_m;
+    PixelLine line;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto k = static_cast<std::size_t>(axis);
+      line.origin_cells[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
+      line.rest_cells[k] = static_cast<float>(origin[axis] - line.origin_cells[k]);
+      line.step[k] = static_cast<float>(-pitch / frame.width / kFinestCell_m * posed.X_WC.R_RT(axis, 1));
+    }
     for (int v = 0; v < frame.height; ++v) {
-      const double z = t - (v + 0.5) * 2.0 * t / frame.height;
-      for (int u = 0; u < frame.width; ++u) {
-        const float depth_m =
-            frame.depth_m[static_cast<std::size_t>(v) * frame.width + static_cast<std::size_t>(u)];
-        if (!(depth_m > 0.0F) || depth_m >= frame.range_m) continue;
-        const double y = t - (u + 0.5) * 2.0 * t / frame.width;
-        const Vector3 p_W = posed.X_WC * (static_cast<double>(depth_m) * Vector3(1.0, y, z));
-        Cell cell{};
-        if (!cell_of(p_W, cell)) continue;
+      const Vector3 ray_C(1.0, pitch * (0.5 - 0.5 / frame.width), pitch * (0.5 - (v + 0.5) / frame.height));
+      const Vector3 first = posed.X_WC.R_RT * ray_C / kFinestCell_m;
+      for (int axis = 0; axis < 3; ++axis) line.first[static_cast<std::size_t>(axis)] = static_cast<float>(first[axis]);
+      const std::size_t width = frame.width;
+      end_cells(line, frame.depth_m.subspan(static_cast<std::size_t>(v) * width, width), frame.range_m, row_);
+      for (std::size_t u = 0; u < width; ++u) {
+        const Cell cell{row_.x[u], row_.y[u], row_.z[u]};
+        // Neighbours in one cell are one look at it.
+        if (cell.x == last.x && cell.y == last.y && cell.z == last.z) continue;
+        last = cell;
+        const bool inside = cell.x >= low_.x && cell.x <= high_.x && cell.y >= low_.y && cell.y <= high_.y &&
+                            cell.z >= low_.z && cell.z <= high_.z;
+        if (!inside) continue;
         const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
-        // Beyond the space that v0 paid for nothing is written: neither free nor occupied.
-        if (order_key_[block_index({bx / 2, by / 2, bz / 2})] * kOrderStep_m > reach_m) continue;
-        Brick* brick = touch(bx, by, bz);
+        const std::size_t position = slot_of(bx, by, bz);
+        if (position != last_position) {
+          last_position = position;
+          // Beyond the space that v0 paid for nothing is written: neither free nor occupied.
+          const bool paid = order_key_[block_index({bx / 2, by / 2, bz / 2})] * kOrderStep_m <= reach_m;
+          brick = paid ? touch(bx, by, bz) : nullptr;
+        }
         if (brick == nullptr) continue;
         brick->add_hit(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)));
         ++work.units;

@@ -59,11 +59,10 @@ class DepthPyramid {
   DepthPyramid(core::Arena& arena, std::size_t max_side) noexcept;
   /// kCapacity if the image is larger than planned. O(pixels).
   [[nodiscard]] Status build(const firmware_if::DepthFrame& frame) noexcept;
-  /// The level for rectangles of up to this many pixels a side. O(levels).
+  /// The level for rectangles of up to this many pixels a side: the least k with side <= 2^k + 2. O(1).
   [[nodiscard]] static constexpr int level_for(std::int32_t side) noexcept {
-    int k = 0;
-    while ((k == 0 ? 2 : (1 << k) + 2) < side) ++k;
-    return k;
+    if (side <= 4) return side <= 2 ? 0 : 1;
+    return 32 - __builtin_clz(static_cast<unsigned>(side - 3));
   }
   [[nodiscard]] const Level& level(int k) const noexcept { return level_[static_cast<std::size_t>(k)]; }
   [[nodiscard]] float steps_per_m() const noexcept { return steps_per_m_; }

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <cstdlib>
+#include "stages/perception/block_sight.hpp"
 #include <limits>
 #include <map>
 #include <memory>
@@ -49,11 +51,12 @@ class OwnMap {
     map_ = std::make_unique<stages::BrickMap>(config_, arena);
     if (arena.exhausted()) std::abort();
   }
-  void integrate(const Scan& scan, int level) {
+  std::uint64_t integrate(const Scan& scan, int level) {
     const std::array<Vector3, 1> here{scan.p_WB()};
     core::UnlimitedBudget unlimited;
     stages::IntegrationResult result;
     if (map_->integrate({scan.frames(), level, kInfinity, here}, unlimited, result) != Status::kOk) std::abort();
+    return result.work.units;
   }
   const stages::MapView& view() {
     core::UnlimitedBudget unlimited;
@@ -117,7 +120,9 @@ void measure(benchmark::State& state, const Case& c, ResetFunction&& reset, Inse
 void own(benchmark::State& state, const Case& c) {
   OwnMap& map = own_map(c.pixels, c.range_m);
   for (int n = 0; n <= kMovingScans; ++n) (void)scan_of(n, c.pixels, c.range_m);
-  measure(state, c, [&] { map.reset(); }, [&](int n) { map.integrate(scan_of(n, c.pixels, c.range_m), c.level); });
+  std::uint64_t units = 0;
+  measure(state, c, [&] { map.reset(); }, [&](int n) { units = map.integrate(scan_of(n, c.pixels, c.range_m), c.level); });
+  state.counters["units"] = static_cast<double>(units);
 }
 
 /// At coarse precision stock gets what its pipeline would give it: one mean point a cell, the averaging not counted.
@@ -164,7 +169,10 @@ class BestReporter final : public benchmark::BenchmarkReporter {
     if (name.empty()) return;
     best_ms_[name] = best_ms;
     allocations_[name] = allocations;
-    std::printf("%-48s %10.3f ms %12.0f allocations\n", name.c_str(), best_ms, allocations);
+    const auto units = runs.front().counters.find("units");
+    std::printf("%-48s %10.3f ms %12.0f allocations", name.c_str(), best_ms, allocations);
+    if (units != runs.front().counters.end()) std::printf(" %10.0f units of work", units->second.value);
+    std::printf("\n");
     std::fflush(stdout);
   }
   [[nodiscard]] double ms(const std::string& name) const {
@@ -208,6 +216,7 @@ int main(int argc, char** argv) {
   using namespace roborun::bench;
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+  if (getenv("SETS")) { std::printf("sets %lx\n", roborun::stages::sight_instruction_sets()); roborun::stages::use_sight_instruction_sets(strtoll(getenv("SETS"),0,0)); }
   std::size_t registered = 0;
   for (const int range_m : {20, 40})
     for (int level = 0; level < roborun::kPrecisionLevels; ++level) registered += add({level, range_m, 128, false}, true);
