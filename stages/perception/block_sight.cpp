@@ -320,33 +320,131 @@ void SeeBrick(const SightCameras& cameras, const SightBlock& brick, int finest, 
 }
 
 void EndCells(const PixelLine& line, std::span<const float> depth_m, float range_m, SurfaceRow& row) {
-  const hn::CappedTag<float, 8> d;
-  const hn::RebindToSigned<decltype(d)> di;
+  const Floats d;
+  const Ints di;
+  constexpr float kBias = 4096.0F;  // makes truncation round down
+  constexpr std::int32_t kNone = -1;
   const std::size_t count = depth_m.size();
-  constexpr std::int32_t kBias = 4096;  // makes truncation round down
-  std::int32_t* const out[3] = {row.x.data(), row.y.data(), row.z.data()};
-  const auto eight = [&](const float* depth, std::size_t u) {
-    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-      const auto z = hn::LoadU(d, depth + i);
-      const auto is_surface = hn::And(hn::Gt(z, hn::Zero(d)), hn::Lt(z, hn::Set(d, range_m)));
-      const auto far = hn::IfThenElseZero(is_surface, z);
-      const auto column = hn::ConvertTo(d, hn::Iota(di, static_cast<std::int32_t>(u + i)));
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const auto direction = hn::Add(hn::Set(d, line.first[axis]), hn::Mul(column, hn::Set(d, line.step[axis])));
-        const auto cells = hn::Add(hn::Mul(far, direction), hn::Set(d, line.rest_cells[axis] + static_cast<float>(kBias)));
-        auto cell = hn::Add(hn::ConvertTo(di, cells), hn::Set(di, line.origin_cells[axis] - kBias));
-        if (axis == 0) cell = hn::IfThenElse(hn::RebindMask(di, is_surface), cell, hn::Set(di, SurfaceRow::kNone));
-        hn::Store(cell, di, out[axis] + u + i);
-      }
+  alignas(32) std::int32_t cell[3][DepthPyramid::kMaxPixels + SurfaceRow::kPad];
+  const auto some = [&](const float* depth, std::size_t u) {
+    const auto z = hn::LoadU(d, depth);
+    auto inside = hn::RebindMask(di, hn::And(hn::Gt(z, hn::Zero(d)), hn::Lt(z, hn::Set(d, range_m))));
+    const auto far = hn::IfThenElseZero(hn::RebindMask(d, inside), z);
+    const auto column = hn::ConvertTo(d, hn::Iota(di, static_cast<std::int32_t>(u)));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto direction = hn::Add(hn::Set(d, line.first[axis]), hn::Mul(column, hn::Set(d, line.step[axis])));
+      const auto cells = hn::Add(hn::Mul(far, direction), hn::Set(d, line.rest[axis] + kBias));
+      const auto c = hn::Add(hn::ConvertTo(di, cells), hn::Set(di, line.origin[axis] - static_cast<std::int32_t>(kBias)));
+      inside = hn::And(inside, hn::And(hn::Gt(c, hn::Set(di, line.low[axis] - 1)), hn::Lt(c, hn::Set(di, line.high[axis] + 1))));
+      hn::Store(c, di, cell[axis] + u);
     }
+    hn::Store(hn::IfThenElse(inside, hn::Load(di, cell[0] + u), hn::Set(di, kNone)), di, cell[0] + u);
   };
+  const std::size_t lanes = hn::Lanes(d);
   std::size_t u = 0;
-  for (; u + 8 <= count; u += 8) eight(depth_m.data() + u, u);
+  for (; u + lanes <= count; u += lanes) some(depth_m.data() + u, u);
   if (u < count) {
     float tail[8] = {};
     for (std::size_t i = 0; u + i < count; ++i) tail[i] = depth_m[u + i];
-    eight(tail, u);
+    some(tail, u);
   }
+  std::int32_t last[3] = {kNone, 0, 0};
+  row.count = 0;
+  for (u = 0; u < count; ++u) {
+    const bool is_new = cell[0][u] != last[0] || cell[1][u] != last[1] || cell[2][u] != last[2];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      last[axis] = cell[axis][u];
+      row.cell[axis][row.count] = last[axis];
+    }
+    row.count += static_cast<std::size_t>(is_new && last[0] != kNone);
+  }
+}
+
+std::size_t DepthSteps(std::span<const float> depth_m, float range_m, float steps_per_m, DepthPyramid::Entry* entry) {
+  const Floats d;
+  const Ints di;
+  const auto range = hn::Set(d, range_m);
+  const auto all = hn::Set(di, DepthPyramid::kMaxSteps);
+  std::size_t lost = 0;
+  const auto some = [&](const float* depth, std::int32_t* to) {
+    const auto raw = hn::LoadU(d, depth);
+    const auto known = hn::Gt(raw, hn::Zero(d));
+    lost += hn::Lanes(d) - hn::CountTrue(d, known);
+    const auto z = hn::IfThenElseZero(known, raw);
+    const auto within = hn::RebindMask(di, hn::Lt(z, range));
+    const auto steps = hn::ConvertTo(di, hn::Mul(hn::Min(z, range), hn::Set(d, steps_per_m)));
+    const auto least = hn::IfThenElse(within, steps, all);
+    const auto not_most = hn::IfThenElseZero(within, hn::Sub(hn::Sub(all, steps), hn::Set(di, 1)));
+    hn::StoreU(hn::Or(least, hn::ShiftLeft<16>(not_most)), di, to);
+  };
+  auto* to = reinterpret_cast<std::int32_t*>(entry);
+  const std::size_t lanes = hn::Lanes(d);
+  std::size_t i = 0;
+  for (; i + lanes <= depth_m.size(); i += lanes) some(depth_m.data() + i, to + i);
+  if (i < depth_m.size()) {
+    float tail[8];
+    std::int32_t out[8];
+    for (std::size_t k = 0; k < 8; ++k) tail[k] = i + k < depth_m.size() ? depth_m[i + k] : range_m;
+    some(tail, out);
+    for (std::size_t k = 0; i + k < depth_m.size(); ++k) to[i + k] = out[k];
+  }
+  return lost;
+}
+
+void LeastOfFour(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride, std::size_t count,
+                 DepthPyramid::Entry* to) {
+  const auto least = [](DepthPyramid::Entry a, DepthPyramid::Entry b) {
+    return DepthPyramid::Entry{std::min(a.least_steps, b.least_steps), std::min(a.not_most_steps, b.not_most_steps)};
+  };
+  std::size_t x = 0;
+#if HWY_TARGET != HWY_SCALAR
+  const hn::CappedTag<std::int16_t, 16> d;
+  const std::size_t entries = hn::Lanes(d) / 2;
+  const auto at = [&](const DepthPyramid::Entry* entry) { return hn::LoadU(d, &entry->least_steps); };
+  if (stride == 1) {
+    for (; x + entries <= count; x += entries)
+      hn::StoreU(hn::Min(hn::Min(at(above + x), at(above + x + 1)), hn::Min(at(below + x), at(below + x + 1))), d,
+                 &to[x].least_steps);
+  }
+#endif
+  for (; x < count; ++x) {
+    const std::size_t i = stride * x;
+    to[x] = least(least(above[i], above[i + stride]), least(below[i], below[i + stride]));
+  }
+}
+
+std::size_t BrickFlags(const std::int8_t* cell, std::uint8_t* mip) {
+  std::size_t unknown = 0;
+  std::size_t i = 0;
+#if HWY_TARGET != HWY_SCALAR
+  const hn::CappedTag<std::int8_t, 32> d;
+  const hn::Repartition<std::uint64_t, decltype(d)> d64;
+  const auto is_unknown = hn::Set(d, evidence::kUnknown), zero = hn::Zero(d);
+  const auto flag = [&](std::uint8_t value) { return hn::Set(d, static_cast<std::int8_t>(value)); };
+  for (; i < kCellsPerBrick; i += hn::Lanes(d)) {
+    const auto v = hn::LoadU(d, cell + i);
+    const auto unknown_here = hn::Eq(v, is_unknown);
+    unknown += hn::CountTrue(d, unknown_here);
+    const auto known = hn::IfThenElse(hn::Gt(v, zero), flag(content::kOccupied), flag(content::kFree));
+    auto word = hn::BitCast(d64, hn::IfThenElse(unknown_here, flag(content::kUnknown), known));
+    word = hn::Or(word, hn::ShiftRight<32>(word));
+    word = hn::Or(word, hn::ShiftRight<16>(word));
+    word = hn::Or(word, hn::ShiftRight<8>(word));
+    alignas(32) std::uint64_t words[4];
+    hn::Store(word, d64, words);
+    for (std::size_t k = 0; k < hn::Lanes(d64); ++k) mip[i / 8 + k] = static_cast<std::uint8_t>(words[k]);
+  }
+#endif
+  for (; i < kCellsPerBrick; i += 8) {
+    unsigned flags = 0;
+    for (std::size_t k = i; k < i + 8; ++k) {
+      const bool known = cell[k] != evidence::kUnknown;
+      flags |= !known ? content::kUnknown : (cell[k] > 0 ? content::kOccupied : content::kFree);
+      unknown += known ? 0U : 1U;
+    }
+    mip[i / 8] = static_cast<std::uint8_t>(flags);
+  }
+  return kCellsPerBrick - unknown;
 }
 
 }  // namespace roborun::stages::HWY_NAMESPACE
@@ -359,6 +457,9 @@ HWY_EXPORT(SeeBlocks);
 HWY_EXPORT(SeeChildren);
 HWY_EXPORT(SeeBrick);
 HWY_EXPORT(EndCells);
+HWY_EXPORT(DepthSteps);
+HWY_EXPORT(LeastOfFour);
+HWY_EXPORT(BrickFlags);
 
 void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& image, const Margin& depth_margin) noexcept {
   const Matrix3 R = posed.X_WC.R_RT.transpose();
@@ -402,6 +503,20 @@ void see_brick(const SightCameras& cameras, const SightBlock& brick, int finest,
 
 void end_cells(const PixelLine& line, std::span<const float> depth_m, float range_m, SurfaceRow& row) noexcept {
   HWY_DYNAMIC_DISPATCH(EndCells)(line, depth_m, range_m, row);
+}
+
+std::size_t depth_steps(std::span<const float> depth_m, float range_m, float steps_per_m,
+                        DepthPyramid::Entry* entry) noexcept {
+  return HWY_DYNAMIC_DISPATCH(DepthSteps)(depth_m, range_m, steps_per_m, entry);
+}
+
+void least_of_four(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride, std::size_t count,
+                   DepthPyramid::Entry* to) noexcept {
+  HWY_DYNAMIC_DISPATCH(LeastOfFour)(above, below, stride, count, to);
+}
+
+std::size_t brick_flags(const std::array<std::int8_t, kCellsPerBrick>& cell, std::uint8_t* mip) noexcept {
+  return HWY_DYNAMIC_DISPATCH(BrickFlags)(cell.data(), mip);
 }
 
 std::int64_t sight_instruction_sets() noexcept { return hwy::SupportedTargets(); }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "stages/perception/brick.hpp"
 #include "stages/perception/depth_pyramid.hpp"
 
 namespace roborun::stages {
@@ -76,20 +77,33 @@ struct BrickSeen {
 /// see_children().
 void see_brick(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) noexcept;
 
-/// Where the pixels of a row end, in cells of the finest level from the map's corner.
-struct SurfaceRow {
-  static constexpr std::int32_t kNone = -1;  ///< x of a pixel without a surface.
-  alignas(32) std::array<std::int32_t, DepthPyramid::kMaxPixels> x, y, z;
-};
-/// A row of an image as a line in cells: pixel u at depth d ends at origin_cells + d (first + u step).
+/// A row of an image as a line in cells of the finest level: pixel u at depth d ends at
+/// origin + rest + d (first + u step). Ends outside [low, high] are none.
 struct PixelLine {
-  std::array<std::int32_t, 3> origin_cells{};  ///< Whole cells, and
-  std::array<float, 3> rest_cells{};           ///< what is left.
+  std::array<std::int32_t, 3> origin{};  ///< Whole cells, and
+  std::array<float, 3> rest{};           ///< what is left of one.
   std::array<float, 3> first{};
   std::array<float, 3> step{};
+  std::array<std::int32_t, 3> low{}, high{};
 };
-/// Precondition: no more than kMaxPixels depths, range_m below 300 m. RT-safe: O(pixels).
+/// The cells in which the pixels of a row end, from left to right; neighbours in one cell are one entry.
+struct SurfaceRow {
+  static constexpr std::size_t kPad = 8;  ///< Room for whole vectors.
+  alignas(32) std::array<std::array<std::int32_t, DepthPyramid::kMaxPixels + 2 * kPad>, 3> cell{};
+  std::size_t count{0};
+};
+/// Precondition: at most kMaxPixels depths, range_m at most kMaxRange_m. RT-safe: O(pixels).
 void end_cells(const PixelLine& line, std::span<const float> depth_m, float range_m, SurfaceRow& row) noexcept;
+
+/// Whole steps of the visible depths: see DepthPyramid. Returns how many pixels have no information.
+[[nodiscard]] std::size_t depth_steps(std::span<const float> depth_m, float range_m, float steps_per_m,
+                                      DepthPyramid::Entry* entry) noexcept;
+/// to[x] = the least of fine[stride x + {0, next}] of two rows; `count` times.
+void least_of_four(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride,
+                   std::size_t count, DepthPyramid::Entry* to) noexcept;
+
+/// mip[i] = content flags of the cells 8 i .. 8 i + 7 of a brick. Returns how many cells are known.
+[[nodiscard]] std::size_t brick_flags(const std::array<std::int8_t, kCellsPerBrick>& cell, std::uint8_t* mip) noexcept;
 
 /// Instruction sets that see_*() can use here, and the use of one of them only (tests); all again with ~0.
 [[nodiscard]] std::int64_t sight_instruction_sets() noexcept;

@@ -2,13 +2,14 @@
 
 #include <cstring>
 
+#include "stages/perception/block_sight.hpp"
+
 namespace roborun::stages {
 namespace {
 
 using Word = std::uint64_t;
 constexpr Word kSigns = 0x8080808080808080ULL;
-constexpr Word kOnes = 0x0101010101010101ULL;
-static_assert(evidence::kFree == -1 && evidence::kUnknown == -128, "free_eight() and refresh() rely on the bits");
+static_assert(evidence::kFree == -1 && evidence::kUnknown == -128, "free_eight() relies on the bits");
 
 /// Bit i of a byte becomes byte i of a word.
 constexpr std::array<Word, 256> make_spread() noexcept {
@@ -31,18 +32,7 @@ void Brick::fill(std::int8_t value) noexcept {
 }
 
 void Brick::refresh() noexcept {
-  // Eight cells are one word; the sign bits and the bits below them tell all.
-  std::uint64_t unknown_sum = 0;
-  for (std::size_t i = 0; i < 512; ++i) {
-    const Word word = load(8 * i);
-    const Word negative = word & kSigns;
-    const Word low_bits = ((word & ~kSigns) + ~kSigns) & kSigns;  // set where a lower bit is
-    const Word unknown = negative & ~low_bits;
-    mip[i] = static_cast<std::uint8_t>((unknown != 0 ? content::kUnknown : 0) |
-                                       ((low_bits & ~negative) != 0 ? content::kOccupied : 0) |
-                                       ((low_bits & negative) != 0 ? content::kFree : 0));
-    unknown_sum += ((unknown >> 7U) * kOnes) >> 56U;
-  }
+  known_count = static_cast<std::uint16_t>(brick_flags(cell, mip.data()));
   std::size_t from = 0;
   std::size_t to = 512;
   for (std::size_t count = 64; count >= 1; count /= 8) {
@@ -56,7 +46,6 @@ void Brick::refresh() noexcept {
     from = to;
     to += count;
   }
-  known_count = static_cast<std::uint16_t>(kCellsPerBrick - unknown_sum);
   stale = false;
 }
 

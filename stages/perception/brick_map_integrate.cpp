@@ -167,17 +167,18 @@ std::size_t BrickMap::clear_blocks(std::size_t count, const IntegrationRequest& 
 void BrickMap::add_surfaces(const IntegrationRequest& request, double reach_m, core::Work& work) noexcept {
   std::size_t last_position = slot_.size();
   Brick* brick = nullptr;
-  Cell last{-1, -1, -1};
   for (std::size_t i = 0; i < cameras_.count; ++i) {
     const PosedDepthFrame& posed = request.frames[frame_of_[i]];
     const firmware_if::DepthFrame& frame = posed.frame;
     const double pitch = 2.0 * static_cast<double>(frame.tan_half_fov_ratio);
     const Vector3 origin = (posed.X_WC.p_RT - corner_W_) / kFinestCell_m;
     PixelLine line;
+    line.low = {low_.x, low_.y, low_.z};
+    line.high = {high_.x, high_.y, high_.z};
     for (int axis = 0; axis < 3; ++axis) {
       const auto k = static_cast<std::size_t>(axis);
-      line.origin_cells[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
-      line.rest_cells[k] = static_cast<float>(origin[axis] - line.origin_cells[k]);
+      line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
+      line.rest[k] = static_cast<float>(origin[axis] - line.origin[k]);
       line.step[k] = static_cast<float>(-pitch / frame.width / kFinestCell_m * posed.X_WC.R_RT(axis, 1));
     }
     for (int v = 0; v < frame.height; ++v) {
@@ -186,14 +187,8 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, double reach_m, c
       for (int axis = 0; axis < 3; ++axis) line.first[static_cast<std::size_t>(axis)] = static_cast<float>(first[axis]);
       const std::size_t width = frame.width;
       end_cells(line, frame.depth_m.subspan(static_cast<std::size_t>(v) * width, width), frame.range_m, row_);
-      for (std::size_t u = 0; u < width; ++u) {
-        const Cell cell{row_.x[u], row_.y[u], row_.z[u]};
-        // Neighbours in one cell are one look at it.
-        if (cell.x == last.x && cell.y == last.y && cell.z == last.z) continue;
-        last = cell;
-        const bool inside = cell.x >= low_.x && cell.x <= high_.x && cell.y >= low_.y && cell.y <= high_.y &&
-                            cell.z >= low_.z && cell.z <= high_.z;
-        if (!inside) continue;
+      for (std::size_t n = 0; n < row_.count; ++n) {
+        const Cell cell{row_.cell[0][n], row_.cell[1][n], row_.cell[2][n]};
         const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
         const std::size_t position = slot_of(bx, by, bz);
         if (position != last_position) {

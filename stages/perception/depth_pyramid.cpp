@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stages/perception/block_sight.hpp"
+
 namespace roborun::stages {
 
 Status check_frame(const PosedDepthFrame& posed) noexcept {
@@ -10,8 +12,8 @@ Status check_frame(const PosedDepthFrame& posed) noexcept {
   const bool size_ok = f.width >= 8 && f.height >= 8 && f.width <= DepthPyramid::kMaxPixels &&
                        f.height <= DepthPyramid::kMaxPixels &&
                        f.depth_m.size() == std::size_t{f.width} * std::size_t{f.height};
-  const bool optics_ok = std::isfinite(f.range_m) && f.range_m > 0.0F &&
-                         std::isfinite(f.tan_half_fov_ratio) && f.tan_half_fov_ratio > 0.0F;
+  const bool optics_ok = f.range_m > 0.0F && f.range_m <= kMaxRange_m && f.tan_half_fov_ratio > 0.0F &&
+                         f.tan_half_fov_ratio <= kMaxTanHalfFov;
   if (!size_ok || !optics_ok || !is_finite(posed.X_WC.p_RT) || !posed.X_WC.R_RT.allFinite())
     return Status::kInvalidArgument;
   const bool any_valid = std::any_of(f.depth_m.begin(), f.depth_m.end(), [](float d) { return d > 0.0F; });
@@ -69,14 +71,7 @@ DepthPyramid::DepthPyramid(core::Arena& arena, std::size_t max_side) noexcept : 
 }
 
 void DepthPyramid::fill_pixels(const firmware_if::DepthFrame& frame, Entry* pixel) noexcept {
-  const std::size_t count = frame.depth_m.size();
-  std::size_t lost = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    const float depth_m = frame.depth_m[i];
-    pixel[i] = entry_of(visible_depth_m(depth_m, frame.range_m), frame.range_m, steps_per_m_);
-    lost += depth_m > 0.0F ? 0U : 1U;
-  }
-  if (lost == 0) return;
+  if (depth_steps(frame.depth_m, frame.range_m, steps_per_m_, pixel) == 0) return;
   for (std::size_t y = 0; y < frame.height; ++y) {
     for (std::size_t x = 0; x < frame.width; ++x) {
       const std::size_t i = y * frame.width + x;
@@ -97,19 +92,15 @@ Status DepthPyramid::build(const firmware_if::DepthFrame& frame) noexcept {
   for (int k = 1; k < kMaxLevels; ++k) {
     // From windows of half the side: this one and the one after it, in both directions.
     const std::size_t stride = k == 1 ? 1 : 2;
-    const std::size_t next = k == 1 ? 1 : 2;
     const std::size_t to_width = (width + stride - 1) / stride;
     const std::size_t to_height = (height + stride - 1) / stride;
     Entry* coarse = fine + width * height;
     for (std::size_t y = 0; y < to_height; ++y) {
       const Entry* above = fine + stride * y * width;
-      const Entry* below = fine + std::min(stride * y + next, height - 1) * width;
+      const Entry* below = fine + std::min(stride * y + stride, height - 1) * width;
       Entry* to = coarse + y * to_width;
-      const std::size_t inner = width > next ? (width - next + stride - 1) / stride : 0;
-      for (std::size_t x = 0; x < inner; ++x) {
-        const std::size_t i = stride * x;
-        to[x] = min_of(min_of(above[i], above[i + next]), min_of(below[i], below[i + next]));
-      }
+      const std::size_t inner = width > stride ? (width - 1) / stride : 0;
+      least_of_four(above, below, stride, inner, to);
       for (std::size_t x = inner; x < to_width; ++x) {
         const std::size_t last = width - 1;
         to[x] = min_of(min_of(above[stride * x], above[last]), min_of(below[stride * x], below[last]));

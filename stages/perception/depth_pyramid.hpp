@@ -11,8 +11,11 @@
 
 namespace roborun::stages {
 
-/// kOk if a frame may be used at all: 8..512 pixels a side, as many depths as pixels, finite positive range
-/// and field of view, finite pose, and at least one pixel that is not NaN or <= 0. Otherwise
+inline constexpr float kMaxRange_m = 300.0F;
+inline constexpr float kMaxTanHalfFov = 2.0F;
+
+/// kOk if a frame may be used at all: 8..512 pixels a side, as many depths as pixels, range in (0, kMaxRange_m]
+/// and field of view in (0, kMaxTanHalfFov], finite pose, and at least one pixel that is not NaN or <= 0. Otherwise
 /// kInvalidArgument. O(pixels) at worst.
 [[nodiscard]] Status check_frame(const PosedDepthFrame& posed) noexcept;
 
