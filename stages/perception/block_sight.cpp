@@ -21,6 +21,8 @@ using Ints = hn::RebindToSigned<Floats>;
 
 constexpr float kNear_m = 1e-3F;  // a block that reaches behind the camera is projected from here on
 
+constexpr double kCore = 0.5;         // of a finest cell, the part that has to be seen past
+
 struct Lanes {
   alignas(32) float x[8];
   alignas(32) float y[8];
@@ -189,7 +191,7 @@ struct Combined {
 
 /// Eight blocks, with their positions in the frame of each camera of the set.
 HWY_INLINE void combine(const SightCameras& cameras, unsigned set, int level, const Lanes* at, Combined& result) {
-  const auto half_m = static_cast<float>(0.5 * cell_size_m(level));
+  const auto half_m = static_cast<float>((level == 0 ? kCore : 1.0) * 0.5 * cell_size_m(level));
   Marks marks;
   for (unsigned rest = set; rest != 0; rest &= rest - 1) {
     const auto k = static_cast<std::size_t>(__builtin_ctz(rest));

@@ -39,7 +39,9 @@ struct SightCameras {
   bool complete{false};  ///< All cameras of the vehicle: what lies between two images is seen by them together.
 };
 
-/// Eight blocks of one size. `free`: seen past, all over, and no camera disagrees. `mixed`: smaller blocks may
+/// Eight blocks of one size. At the finest level only the inner half of a cell's edge counts: a surface in its
+/// rim ends in it, and is written after free space; without this a cell that touches a shadow or the ground is
+/// never free. `free`: seen past, all over, and no camera disagrees. `mixed`: smaller blocks may
 /// be free. Bit i is block i.
 struct EightSeen {
   std::uint8_t free{}, mixed{};
