@@ -9,6 +9,7 @@
 #include <string>
 
 #include "platform/app/fly_command.hpp"
+#include "platform/app/map_command.hpp"
 #include "platform/sitl/world/input_error.hpp"
 
 namespace {
@@ -29,6 +30,7 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   app.set_version_flag("--version", "roborun 0.1.0");
   std::function<int()> run;
   roborun::app::add_fly_command(app, run);
+  roborun::app::add_map_command(app, run);
   try {
     app.parse(argc, argv);
     return run ? run() : 2;

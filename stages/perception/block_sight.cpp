@@ -327,7 +327,8 @@ void EndCells(const PixelLine& line, std::span<const float> depth_m, float range
   constexpr float kBias = 4096.0F;  // makes truncation round down
   constexpr std::int32_t kNone = -1;
   const std::size_t count = depth_m.size();
-  alignas(32) std::int32_t cell[3][DepthPyramid::kMaxPixels + SurfaceRow::kPad];
+  constexpr std::size_t kPad = SurfaceRow::kPad;
+  alignas(32) std::int32_t cell[3][kPad + DepthPyramid::kMaxPixels + kPad];
   const auto some = [&](const float* depth, std::size_t u) {
     const auto z = hn::LoadU(d, depth);
     auto inside = hn::RebindMask(di, hn::And(hn::Gt(z, hn::Zero(d)), hn::Lt(z, hn::Set(d, range_m))));
@@ -338,9 +339,9 @@ void EndCells(const PixelLine& line, std::span<const float> depth_m, float range
       const auto cells = hn::Add(hn::Mul(far, direction), hn::Set(d, line.rest[axis] + kBias));
       const auto c = hn::Add(hn::ConvertTo(di, cells), hn::Set(di, line.origin[axis] - static_cast<std::int32_t>(kBias)));
       inside = hn::And(inside, hn::And(hn::Gt(c, hn::Set(di, line.low[axis] - 1)), hn::Lt(c, hn::Set(di, line.high[axis] + 1))));
-      hn::Store(c, di, cell[axis] + u);
+      hn::Store(c, di, cell[axis] + kPad + u);
     }
-    hn::Store(hn::IfThenElse(inside, hn::Load(di, cell[0] + u), hn::Set(di, kNone)), di, cell[0] + u);
+    hn::Store(hn::IfThenElse(inside, hn::Load(di, cell[0] + kPad + u), hn::Set(di, kNone)), di, cell[0] + kPad + u);
   };
   const std::size_t lanes = hn::Lanes(d);
   std::size_t u = 0;
@@ -350,15 +351,19 @@ void EndCells(const PixelLine& line, std::span<const float> depth_m, float range
     for (std::size_t i = 0; u + i < count; ++i) tail[i] = depth_m[u + i];
     some(tail, u);
   }
-  std::int32_t last[3] = {kNone, 0, 0};
+  // Keep those that differ from their left neighbour.
+  for (auto& axis : cell) axis[kPad - 1] = kNone;
   row.count = 0;
-  for (u = 0; u < count; ++u) {
-    const bool is_new = cell[0][u] != last[0] || cell[1][u] != last[1] || cell[2][u] != last[2];
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      last[axis] = cell[axis][u];
-      row.cell[axis][row.count] = last[axis];
-    }
-    row.count += static_cast<std::size_t>(is_new && last[0] != kNone);
+  for (u = 0; u < count; u += lanes) {
+    const auto differs = [&](std::size_t axis) {
+      return hn::Ne(hn::Load(di, cell[axis] + kPad + u), hn::LoadU(di, cell[axis] + kPad + u - 1));
+    };
+    const auto is_new = hn::Or(differs(0), hn::Or(differs(1), differs(2)));
+    const auto keep = hn::And(is_new, hn::Gt(hn::Load(di, cell[0] + kPad + u), hn::Set(di, kNone)));
+    std::size_t kept = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      kept = hn::CompressStore(hn::Load(di, cell[axis] + kPad + u), keep, di, row.cell[axis].data() + row.count);
+    row.count += kept;
   }
 }
 

@@ -22,7 +22,7 @@ namespace roborun::bench {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr int kMovingScans = 5;
+constexpr int kMovingScans = 3;
 constexpr std::array<StockMode, 4> kModes{StockMode::kPlain, StockMode::kLazy, StockMode::kDiscretised,
                                           StockMode::kBoth};
 
@@ -147,7 +147,7 @@ std::size_t add(const Case& c, bool all_modes) {
     if (!all_modes && mode != StockMode::kPlain && mode != StockMode::kBoth) continue;
     benchmark::RegisterBenchmark(name_of(std::string("stock_") + to_string(mode), c).c_str(),
                                  [c, mode](benchmark::State& s) { stock(s, c, mode); })
-        ->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(1)->Repetitions(c.level == 0 ? 2 : 5);
+        ->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(1)->Repetitions(c.level > 0 ? 5 : (c.moving ? 1 : 2));
     ++registered;
   }
   return registered;
