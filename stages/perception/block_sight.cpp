@@ -1,7 +1,8 @@
 // Eight lanes are all there is to do: wider registers were slower than AVX2.
 #define HWY_DISABLED_TARGETS (HWY_AVX3 | HWY_AVX3_DL)
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "stages/perception/block_sight.cpp"  // this file is compiled once an instruction set
+#define HWY_TARGET_INCLUDE \
+  "stages/perception/block_sight.cpp"  // this file is compiled once an instruction set
 #include <hwy/foreach_target.h>
 // After foreach_target.
 #include <hwy/highway.h>
@@ -21,7 +22,7 @@ using Ints = hn::RebindToSigned<Floats>;
 
 constexpr float kNear_m = 1e-3F;  // a block that reaches behind the camera is projected from here on
 
-constexpr double kCore = 0.5;         // of a finest cell, the part that has to be seen past
+constexpr double kCore = 0.5;  // of a finest cell, the part that has to be seen past
 
 struct Lanes {
   alignas(32) float x[8];
@@ -44,9 +45,10 @@ struct Rectangles {
   alignas(32) std::int32_t entry[8];
 };
 
-/// The minimum of four entries. Single loads: gather instructions are slow where they are patched against leaks.
-HWY_INLINE void store_least(const DepthPyramid::Entry* entry, std::int32_t a, std::int32_t b, std::int32_t c, std::int32_t e,
-                            std::int32_t* to) {
+/// The minimum of four entries. Single loads: gather instructions are slow where they are patched against
+/// leaks.
+HWY_INLINE void store_least(const DepthPyramid::Entry* entry, std::int32_t a, std::int32_t b, std::int32_t c,
+                            std::int32_t e, std::int32_t* to) {
 #if HWY_TARGET == HWY_SCALAR
   std::int16_t least = DepthPyramid::kMaxSteps, not_most = DepthPyramid::kMaxSteps;
   for (const std::int32_t i : {a, b, c, e}) {
@@ -57,7 +59,8 @@ HWY_INLINE void store_least(const DepthPyramid::Entry* entry, std::int32_t a, st
 #else
   const hn::CappedTag<std::int16_t, 2> pair;
   const auto at = [&](std::int32_t i) { return hn::LoadU(pair, &entry[i].least_steps); };
-  hn::StoreU(hn::Min(hn::Min(at(a), at(b)), hn::Min(at(c), at(e))), pair, reinterpret_cast<std::int16_t*>(to));
+  hn::StoreU(hn::Min(hn::Min(at(a), at(b)), hn::Min(at(c), at(e))), pair,
+             reinterpret_cast<std::int16_t*>(to));
 #endif
 }
 
@@ -68,23 +71,26 @@ HWY_INLINE unsigned bits_of(Mask mask) {
   return bytes[0];
 }
 
-/// Half the width of a block's image around its centre's tangent: |d/dx y/x| summed over the cube's axes, an upper bound
-/// because the denominator is the nearest depth.
+/// Half the width of a block's image around its centre's tangent: |d/dx y/x| summed over the cube's axes, an
+/// upper bound because the denominator is the nearest depth.
 template <class V>
 HWY_INLINE V half_width(const SightCamera& c, std::size_t row, V tangent, V half_over_near) {
   const Floats d;
   V sum = hn::Zero(d);
   for (std::size_t axis = 0; axis < 3; ++axis)
-    sum = hn::Add(sum, hn::Abs(hn::Sub(hn::Set(d, c.R_CW[3 * row + axis]), hn::Mul(tangent, hn::Set(d, c.R_CW[axis])))));
+    sum = hn::Add(sum, hn::Abs(hn::Sub(hn::Set(d, c.R_CW[3 * row + axis]),
+                                       hn::Mul(tangent, hn::Set(d, c.R_CW[axis])))));
   return hn::Mul(sum, half_over_near);
 }
 
 template <class V>
-HWY_INLINE void store_pixels(V low, V high, float scale, float last, V keep, std::int32_t* first, std::int32_t* end) {
+HWY_INLINE void store_pixels(V low, V high, float scale, float last, V keep, std::int32_t* first,
+                             std::int32_t* end) {
   const Floats d;
   const V limit = hn::Set(d, last);
   const auto pixel = [&](V tangent) {
-    return hn::ConvertTo(Ints(), hn::And(keep, hn::Min(hn::Max(hn::Mul(tangent, hn::Set(d, scale)), hn::Zero(d)), limit)));
+    return hn::ConvertTo(
+        Ints(), hn::And(keep, hn::Min(hn::Max(hn::Mul(tangent, hn::Set(d, scale)), hn::Zero(d)), limit)));
   };
   hn::Store(pixel(low), Ints(), first);
   hn::Store(pixel(high), Ints(), end);
@@ -110,8 +116,10 @@ HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Ma
     const auto s0 = set(half_m * c.support[0]), s1 = set(half_m * c.support[1]);
     const auto s2 = set(half_m * c.support[2]), s3 = set(half_m * c.support[3]);
     const auto zero = hn::Zero(d);
-    const auto seen = hn::Min(hn::Min(hn::Add(left, s0), hn::Add(right, s1)), hn::Min(hn::Add(up, s2), hn::Add(down, s3)));
-    const auto all = hn::Min(hn::Min(hn::Sub(left, s0), hn::Sub(right, s1)), hn::Min(hn::Sub(up, s2), hn::Sub(down, s3)));
+    const auto seen =
+        hn::Min(hn::Min(hn::Add(left, s0), hn::Add(right, s1)), hn::Min(hn::Add(up, s2), hn::Add(down, s3)));
+    const auto all =
+        hn::Min(hn::Min(hn::Sub(left, s0), hn::Sub(right, s1)), hn::Min(hn::Sub(up, s2), hn::Sub(down, s3)));
     const auto is_outside = hn::Or(hn::Le(seen, zero), hn::Le(far, set(kNear_m)));
     const auto is_straddling = hn::Le(near, set(kNear_m));
     outside |= bits_of(is_outside) << i;
@@ -128,8 +136,10 @@ HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Ma
     const auto dv = half_width(c, 2, v, half_over_near);
     const auto u_middle = hn::Sub(set(c.tan_half), u);
     const auto v_middle = hn::Sub(set(c.tan_half), v);
-    store_pixels(hn::Sub(u_middle, du), hn::Add(u_middle, du), c.columns_per_tan, c.last_column, keep, r.u0 + i, r.u1 + i);
-    store_pixels(hn::Sub(v_middle, dv), hn::Add(v_middle, dv), c.rows_per_tan, c.last_row, keep, r.v0 + i, r.v1 + i);
+    store_pixels(hn::Sub(u_middle, du), hn::Add(u_middle, du), c.columns_per_tan, c.last_column, keep,
+                 r.u0 + i, r.u1 + i);
+    store_pixels(hn::Sub(v_middle, dv), hn::Add(v_middle, dv), c.rows_per_tan, c.last_row, keep, r.v0 + i,
+                 r.v1 + i);
     const auto span = [&](const std::int32_t* first, const std::int32_t* last) {
       return hn::Sub(hn::Load(di, last + i), hn::Load(di, first + i));
     };
@@ -139,7 +149,8 @@ HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Ma
     const auto needed = hn::Min(hn::Add(far, margin), hn::Max(far, set(c.range_m)));
     const auto steps = set(c.pyramid->steps_per_m());
     const auto most_steps = set(2.0F * static_cast<float>(DepthPyramid::kMaxSteps));
-    hn::Store(hn::Add(hn::ConvertTo(di, hn::Min(hn::Mul(needed, steps), most_steps)), hn::Set(di, 1)), di, r.needed + i);
+    hn::Store(hn::Add(hn::ConvertTo(di, hn::Min(hn::Mul(needed, steps), most_steps)), hn::Set(di, 1)), di,
+              r.needed + i);
     hn::Store(hn::ConvertTo(di, hn::Min(hn::Max(hn::Mul(near, steps), zero), most_steps)), di, r.nearest + i);
   }
   const unsigned looked = ~(outside | straddling) & 0xFFU;
@@ -152,7 +163,9 @@ HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Ma
   const DepthPyramid::Level& level = c.pyramid->level(DepthPyramid::level_for(side));
   unsigned sees_past = 0, hidden = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    const auto first = [&](const std::int32_t* from) { return hn::ShiftRightSame(hn::Load(di, from + i), level.shift); };
+    const auto first = [&](const std::int32_t* from) {
+      return hn::ShiftRightSame(hn::Load(di, from + i), level.shift);
+    };
     const auto last = [&](const std::int32_t* to) {
       const auto past = hn::Add(hn::Load(di, to + i), hn::Set(di, 1 << level.shift));
       return hn::Sub(hn::ShiftRightSame(past, level.shift), hn::Set(di, level.back));
@@ -190,7 +203,8 @@ struct Combined {
 };
 
 /// Eight blocks, with their positions in the frame of each camera of the set.
-HWY_INLINE void combine(const SightCameras& cameras, unsigned set, int level, const Lanes* at, Combined& result) {
+HWY_INLINE void combine(const SightCameras& cameras, unsigned set, int level, const Lanes* at,
+                        Combined& result) {
   const auto half_m = static_cast<float>((level == 0 ? kCore : 1.0) * 0.5 * cell_size_m(level));
   Marks marks;
   for (unsigned rest = set; rest != 0; rest &= rest - 1) {
@@ -231,7 +245,8 @@ HWY_INLINE std::array<float, 3> in_camera(const SightCamera& c, const Vector3& p
   const Vector3 offset_W = p_W - c.p_WC;
   std::array<float, 3> p_C{};
   for (std::size_t row = 0; row < 3; ++row) {
-    p_C[row] = c.R_CW[3 * row] * static_cast<float>(offset_W.x()) + c.R_CW[3 * row + 1] * static_cast<float>(offset_W.y()) +
+    p_C[row] = c.R_CW[3 * row] * static_cast<float>(offset_W.x()) +
+               c.R_CW[3 * row + 1] * static_cast<float>(offset_W.y()) +
                c.R_CW[3 * row + 2] * static_cast<float>(offset_W.z());
   }
   return p_C;
@@ -303,8 +318,10 @@ void SeeBrick(const SightCameras& cameras, const SightBlock& brick, int finest, 
     const int level = node.level - 1;
     combine(cameras, node.cameras, level, at, combined);
     if (combined.free != 0) {
-      seen.group[seen.count++] = {node.morton, static_cast<std::uint8_t>(level), static_cast<std::uint8_t>(combined.free)};
-      seen.free_cells += static_cast<std::uint32_t>(__builtin_popcount(combined.free)) << (3U * static_cast<unsigned>(level));
+      seen.group[seen.count++] = {node.morton, static_cast<std::uint8_t>(level),
+                                  static_cast<std::uint8_t>(combined.free)};
+      seen.free_cells += static_cast<std::uint32_t>(__builtin_popcount(combined.free))
+                         << (3U * static_cast<unsigned>(level));
     }
     if (level <= finest) continue;
     for (unsigned mixed = combined.mixed; mixed != 0; mixed &= mixed - 1) {
@@ -335,13 +352,17 @@ void EndCells(const PixelLine& line, std::span<const float> depth_m, float range
     const auto far = hn::IfThenElseZero(hn::RebindMask(d, inside), z);
     const auto column = hn::ConvertTo(d, hn::Iota(di, static_cast<std::int32_t>(u)));
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto direction = hn::Add(hn::Set(d, line.first[axis]), hn::Mul(column, hn::Set(d, line.step[axis])));
+      const auto direction =
+          hn::Add(hn::Set(d, line.first[axis]), hn::Mul(column, hn::Set(d, line.step[axis])));
       const auto cells = hn::Add(hn::Mul(far, direction), hn::Set(d, line.rest[axis] + kBias));
-      const auto c = hn::Add(hn::ConvertTo(di, cells), hn::Set(di, line.origin[axis] - static_cast<std::int32_t>(kBias)));
-      inside = hn::And(inside, hn::And(hn::Gt(c, hn::Set(di, line.low[axis] - 1)), hn::Lt(c, hn::Set(di, line.high[axis] + 1))));
+      const auto c = hn::Add(hn::ConvertTo(di, cells),
+                             hn::Set(di, line.origin[axis] - static_cast<std::int32_t>(kBias)));
+      inside = hn::And(inside, hn::And(hn::Gt(c, hn::Set(di, line.low[axis] - 1)),
+                                       hn::Lt(c, hn::Set(di, line.high[axis] + 1))));
       hn::Store(c, di, cell[axis] + kPad + u);
     }
-    hn::Store(hn::IfThenElse(inside, hn::Load(di, cell[0] + kPad + u), hn::Set(di, kNone)), di, cell[0] + kPad + u);
+    hn::Store(hn::IfThenElse(inside, hn::Load(di, cell[0] + kPad + u), hn::Set(di, kNone)), di,
+              cell[0] + kPad + u);
   };
   const std::size_t lanes = hn::Lanes(d);
   std::size_t u = 0;
@@ -362,12 +383,14 @@ void EndCells(const PixelLine& line, std::span<const float> depth_m, float range
     const auto keep = hn::And(is_new, hn::Gt(hn::Load(di, cell[0] + kPad + u), hn::Set(di, kNone)));
     std::size_t kept = 0;
     for (std::size_t axis = 0; axis < 3; ++axis)
-      kept = hn::CompressStore(hn::Load(di, cell[axis] + kPad + u), keep, di, row.cell[axis].data() + row.count);
+      kept =
+          hn::CompressStore(hn::Load(di, cell[axis] + kPad + u), keep, di, row.cell[axis].data() + row.count);
     row.count += kept;
   }
 }
 
-std::size_t DepthSteps(std::span<const float> depth_m, float range_m, float steps_per_m, DepthPyramid::Entry* entry) {
+std::size_t DepthSteps(std::span<const float> depth_m, float range_m, float steps_per_m,
+                       DepthPyramid::Entry* entry) {
   const Floats d;
   const Ints di;
   const auto range = hn::Set(d, range_m);
@@ -398,10 +421,11 @@ std::size_t DepthSteps(std::span<const float> depth_m, float range_m, float step
   return lost;
 }
 
-void LeastOfFour(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride, std::size_t count,
-                 DepthPyramid::Entry* to) {
+void LeastOfFour(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride,
+                 std::size_t count, DepthPyramid::Entry* to) {
   const auto least = [](DepthPyramid::Entry a, DepthPyramid::Entry b) {
-    return DepthPyramid::Entry{std::min(a.least_steps, b.least_steps), std::min(a.not_most_steps, b.not_most_steps)};
+    return DepthPyramid::Entry{std::min(a.least_steps, b.least_steps),
+                               std::min(a.not_most_steps, b.not_most_steps)};
   };
   std::size_t x = 0;
 #if HWY_TARGET != HWY_SCALAR
@@ -410,8 +434,9 @@ void LeastOfFour(const DepthPyramid::Entry* above, const DepthPyramid::Entry* be
   const auto at = [&](const DepthPyramid::Entry* entry) { return hn::LoadU(d, &entry->least_steps); };
   if (stride == 1) {
     for (; x + entries <= count; x += entries)
-      hn::StoreU(hn::Min(hn::Min(at(above + x), at(above + x + 1)), hn::Min(at(below + x), at(below + x + 1))), d,
-                 &to[x].least_steps);
+      hn::StoreU(
+          hn::Min(hn::Min(at(above + x), at(above + x + 1)), hn::Min(at(below + x), at(below + x + 1))), d,
+          &to[x].least_steps);
   }
 #endif
   for (; x < count; ++x) {
@@ -468,7 +493,8 @@ HWY_EXPORT(DepthSteps);
 HWY_EXPORT(LeastOfFour);
 HWY_EXPORT(BrickFlags);
 
-void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& image, const Margin& depth_margin) noexcept {
+void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& image,
+                          const Margin& depth_margin) noexcept {
   const Matrix3 R = posed.X_WC.R_RT.transpose();
   const auto t = static_cast<double>(posed.frame.tan_half_fov_ratio);
   p_WC = posed.X_WC.p_RT;
@@ -479,9 +505,11 @@ void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& imag
   };
   for (int i = 0; i < 9; ++i) R_CW[static_cast<std::size_t>(i)] = static_cast<float>(R(i / 3, i % 3));
   for (std::size_t i = 0; i < 8; ++i) {
-    const Vector3 offset_W((i & 1U) != 0 ? 1.0 : -1.0, (i & 2U) != 0 ? 1.0 : -1.0, (i & 4U) != 0 ? 1.0 : -1.0);
+    const Vector3 offset_W((i & 1U) != 0 ? 1.0 : -1.0, (i & 2U) != 0 ? 1.0 : -1.0,
+                           (i & 4U) != 0 ? 1.0 : -1.0);
     const Vector3 offset_C = R * offset_W;
-    for (std::size_t row = 0; row < 3; ++row) child[row][i] = static_cast<float>(offset_C[static_cast<Eigen::Index>(row)]);
+    for (std::size_t row = 0; row < 3; ++row)
+      child[row][i] = static_cast<float>(offset_C[static_cast<Eigen::Index>(row)]);
   }
   extent = sum_abs(0.0, 0, 1.0);
   support = {sum_abs(1.0, 1, -1.0), sum_abs(1.0, 1, 1.0), sum_abs(1.0, 2, -1.0), sum_abs(1.0, 2, 1.0)};
@@ -496,7 +524,8 @@ void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& imag
   pyramid = &image;
 }
 
-EightSeen see_blocks(const SightCameras& cameras, int level, const std::array<Vector3, 8>& center_W) noexcept {
+EightSeen see_blocks(const SightCameras& cameras, int level,
+                     const std::array<Vector3, 8>& center_W) noexcept {
   return HWY_DYNAMIC_DISPATCH(SeeBlocks)(cameras, level, center_W);
 }
 
@@ -508,7 +537,8 @@ void see_brick(const SightCameras& cameras, const SightBlock& brick, int finest,
   HWY_DYNAMIC_DISPATCH(SeeBrick)(cameras, brick, finest, seen);
 }
 
-void end_cells(const PixelLine& line, std::span<const float> depth_m, float range_m, SurfaceRow& row) noexcept {
+void end_cells(const PixelLine& line, std::span<const float> depth_m, float range_m,
+               SurfaceRow& row) noexcept {
   HWY_DYNAMIC_DISPATCH(EndCells)(line, depth_m, range_m, row);
 }
 
@@ -517,8 +547,8 @@ std::size_t depth_steps(std::span<const float> depth_m, float range_m, float ste
   return HWY_DYNAMIC_DISPATCH(DepthSteps)(depth_m, range_m, steps_per_m, entry);
 }
 
-void least_of_four(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride, std::size_t count,
-                   DepthPyramid::Entry* to) noexcept {
+void least_of_four(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride,
+                   std::size_t count, DepthPyramid::Entry* to) noexcept {
   HWY_DYNAMIC_DISPATCH(LeastOfFour)(above, below, stride, count, to);
 }
 

@@ -1,5 +1,5 @@
-/// Which blocks of space do the cameras of one scan see through? Eight blocks at a time, with the widest vector
-/// instructions of the machine; the same bits on all of them.
+/// Which blocks of space do the cameras of one scan see through? Eight blocks at a time, with the widest
+/// vector instructions of the machine; the same bits on all of them.
 #pragma once
 
 #include <array>
@@ -23,10 +23,12 @@ struct SightCamera {
   void prepare(const PosedDepthFrame& posed, const DepthPyramid& image, const Margin& depth_margin) noexcept;
 
   Vector3 p_WC = Vector3::Zero();
-  std::array<float, 9> R_CW{};    ///< Row-major.
-  alignas(32) std::array<std::array<float, 8>, 3> child{};  ///< Centres of a block's children, for a quarter edge of 1.
-  float extent{};  ///< Half extent of a cube of half-edge 1 along the optical axis.
-  std::array<float, 4> support{};  ///< The same against the four sides of the field of view: left, right, up, down.
+  std::array<float, 9> R_CW{};  ///< Row-major.
+  alignas(32) std::array<std::array<float, 8>,
+                         3> child{};  ///< Centres of a block's children, for a quarter edge of 1.
+  float extent{};                     ///< Half extent of a cube of half-edge 1 along the optical axis.
+  std::array<float, 4>
+      support{};  ///< The same against the four sides of the field of view: left, right, up, down.
   float tan_half{}, range_m{};
   float columns_per_tan{}, rows_per_tan{}, last_column{}, last_row{};
   float margin_m{}, margin_per_m2{};
@@ -36,13 +38,14 @@ struct SightCamera {
 struct SightCameras {
   std::array<SightCamera, kMaxCameras> camera{};
   std::size_t count{0};
-  bool complete{false};  ///< All cameras of the vehicle: what lies between two images is seen by them together.
+  bool complete{
+      false};  ///< All cameras of the vehicle: what lies between two images is seen by them together.
 };
 
-/// Eight blocks of one size. At the finest level only the inner half of a cell's edge counts: a surface in its
-/// rim ends in it, and is written after free space; without this a cell that touches a shadow or the ground is
-/// never free. `free`: seen past, all over, and no camera disagrees. `mixed`: smaller blocks may
-/// be free. Bit i is block i.
+/// Eight blocks of one size. At the finest level only the inner half of a cell's edge counts: a surface in
+/// its rim ends in it, and is written after free space; without this a cell that touches a shadow or the
+/// ground is never free. `free`: seen past, all over, and no camera disagrees. `mixed`: smaller blocks may be
+/// free. Bit i is block i.
 struct EightSeen {
   std::uint8_t free{}, mixed{};
   std::array<std::uint8_t, 8> cameras{};  ///< For each block, the set of cameras that can see some of it.
@@ -95,7 +98,8 @@ struct SurfaceRow {
   std::size_t count{0};
 };
 /// Precondition: at most kMaxPixels depths, range_m at most kMaxRange_m. RT-safe: O(pixels).
-void end_cells(const PixelLine& line, std::span<const float> depth_m, float range_m, SurfaceRow& row) noexcept;
+void end_cells(const PixelLine& line, std::span<const float> depth_m, float range_m,
+               SurfaceRow& row) noexcept;
 
 /// Whole steps of the visible depths: see DepthPyramid. Returns how many pixels have no information.
 [[nodiscard]] std::size_t depth_steps(std::span<const float> depth_m, float range_m, float steps_per_m,
@@ -105,7 +109,8 @@ void least_of_four(const DepthPyramid::Entry* above, const DepthPyramid::Entry* 
                    std::size_t count, DepthPyramid::Entry* to) noexcept;
 
 /// mip[i] = content flags of the cells 8 i .. 8 i + 7 of a brick. Returns how many cells are known.
-[[nodiscard]] std::size_t brick_flags(const std::array<std::int8_t, kCellsPerBrick>& cell, std::uint8_t* mip) noexcept;
+[[nodiscard]] std::size_t brick_flags(const std::array<std::int8_t, kCellsPerBrick>& cell,
+                                      std::uint8_t* mip) noexcept;
 
 /// Instruction sets that see_*() can use here, and the use of one of them only (tests); all again with ~0.
 [[nodiscard]] std::int64_t sight_instruction_sets() noexcept;

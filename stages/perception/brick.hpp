@@ -72,12 +72,14 @@ struct Brick {
   return kStart[static_cast<std::size_t>(level)] + morton;
 }
 
-inline constexpr std::array<std::uint16_t, 16> kMortonSpread{0x000, 0x001, 0x008, 0x009, 0x040, 0x041, 0x048, 0x049,
-                                                             0x200, 0x201, 0x208, 0x209, 0x240, 0x241, 0x248, 0x249};
+inline constexpr std::array<std::uint16_t, 16> kMortonSpread{0x000, 0x001, 0x008, 0x009, 0x040, 0x041,
+                                                             0x048, 0x049, 0x200, 0x201, 0x208, 0x209,
+                                                             0x240, 0x241, 0x248, 0x249};
 
 /// Interleaves the low four bits of x, y, z: x lowest.
 [[nodiscard]] constexpr std::uint32_t morton3(std::uint32_t x, std::uint32_t y, std::uint32_t z) noexcept {
-  return static_cast<std::uint32_t>(kMortonSpread[x & 15U]) | (static_cast<std::uint32_t>(kMortonSpread[y & 15U]) << 1U) |
+  return static_cast<std::uint32_t>(kMortonSpread[x & 15U]) |
+         (static_cast<std::uint32_t>(kMortonSpread[y & 15U]) << 1U) |
          (static_cast<std::uint32_t>(kMortonSpread[z & 15U]) << 2U);
 }
 

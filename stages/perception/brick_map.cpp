@@ -47,7 +47,8 @@ std::size_t BrickMap::arena_bytes(const Config& config) noexcept {
   const std::size_t positions = position_count(config.bounds_W);
   return positions * sizeof(std::int32_t) + positions / 8 * (sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
          config.max_bricks * (sizeof(Brick) + 2 * sizeof(std::uint32_t)) +
-         config.max_frames * DepthPyramid::arena_bytes(config.max_image_side) + 16 * alignof(std::max_align_t);
+         config.max_frames * DepthPyramid::arena_bytes(config.max_image_side) +
+         16 * alignof(std::max_align_t);
 }
 
 BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
@@ -208,7 +209,8 @@ std::uint64_t BrickMap::digest() const noexcept {
   for (std::size_t position = 0; position < slot_.size(); ++position) {
     if (slot_[position] == kUnknownBrick) continue;
     hash.add(static_cast<std::uint64_t>(position));
-    const Brick& b = slot_[position] == kFreeBrick ? free_brick_ : brick_[static_cast<std::size_t>(slot_[position])];
+    const Brick& b =
+        slot_[position] == kFreeBrick ? free_brick_ : brick_[static_cast<std::size_t>(slot_[position])];
     for (std::size_t i = 0; i < kCellsPerBrick; i += 8) {
       std::uint64_t word = 0;
       for (std::size_t k = 0; k < 8; ++k) word = (word << 8U) | static_cast<std::uint8_t>(b.cell[i + k]);

@@ -1,5 +1,5 @@
-/// The occupancy map of the project: bricks on the precision lattice, in fixed memory. A brick that is free all
-/// over needs no memory but its place in the table of positions.
+/// The occupancy map of the project: bricks on the precision lattice, in fixed memory. A brick that is free
+/// all over needs no memory but its place in the table of positions.
 ///
 /// Free space is found projectively, coarse to fine: a block all of whose pixels see past it is free at once,
 /// a block behind the surface is left alone, the rest is divided until cells of p0. Surfaces are the pixels'
@@ -92,8 +92,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   [[nodiscard]] std::size_t clear_blocks(std::size_t count, const IntegrationRequest& request,
                                          core::StageBudget& budget, core::Work& work) noexcept;
   /// False when the budget was spent on the way.
-  [[nodiscard]] bool clear_bricks(const Block& block, std::uint8_t cameras, int finest, core::StageBudget& budget,
-                                  core::Work& work) noexcept;
+  [[nodiscard]] bool clear_bricks(const Block& block, std::uint8_t cameras, int finest,
+                                  core::StageBudget& budget, core::Work& work) noexcept;
   void free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
   void add_surfaces(const IntegrationRequest& request, double reach_m, core::Work& work) noexcept;
   void free_vehicle() noexcept;
@@ -116,7 +116,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   std::span<Brick> brick_;
   std::span<std::uint32_t> free_list_;
   std::span<std::uint32_t> dirty_;
-  std::span<std::uint32_t> order_;  ///< Blocks near the cameras, nearest to the trajectory first.
+  std::span<std::uint32_t> order_;      ///< Blocks near the cameras, nearest to the trajectory first.
   std::span<std::uint16_t> order_key_;  ///< Of each block of the map.
   std::size_t free_count_{0};
   std::size_t dirty_count_{0};

@@ -15,7 +15,9 @@ constexpr double volume_m3(int level) noexcept {
   return edge_m * edge_m * edge_m;
 }
 
-std::uint32_t in_brick(std::int32_t cell) noexcept { return static_cast<std::uint32_t>(cell & (kBrickCells - 1)); }
+std::uint32_t in_brick(std::int32_t cell) noexcept {
+  return static_cast<std::uint32_t>(cell & (kBrickCells - 1));
+}
 
 }  // namespace
 
@@ -38,7 +40,8 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
 }
 
 std::size_t BrickMap::block_index(const Block& block) const noexcept {
-  return (static_cast<std::size_t>(block.z) * static_cast<std::size_t>(ny_ / 2) + static_cast<std::size_t>(block.y)) *
+  return (static_cast<std::size_t>(block.z) * static_cast<std::size_t>(ny_ / 2) +
+          static_cast<std::size_t>(block.y)) *
              static_cast<std::size_t>(nx_ / 2) +
          static_cast<std::size_t>(block.x);
 }
@@ -121,7 +124,8 @@ bool BrickMap::clear_bricks(const Block& block, std::uint8_t cameras, int finest
       free_brick(bx, by, bz);
       work.volume_m3 += volume_m3(kBrickLevel);
     } else if (((eight.mixed >> child) & 1) != 0 && finest < kBrickLevel) {
-      see_brick(cameras_, {brick_center_W(bx, by, bz), kBrickLevel, eight.cameras[static_cast<std::size_t>(child)]},
+      see_brick(cameras_,
+                {brick_center_W(bx, by, bz), kBrickLevel, eight.cameras[static_cast<std::size_t>(child)]},
                 finest, seen_);
       work.units += seen_.visited;
       work.volume_m3 += seen_.free_cells * volume_m3(0);
@@ -145,7 +149,8 @@ std::size_t BrickMap::clear_blocks(std::size_t count, const IntegrationRequest& 
   std::array<Vector3, 8> center_W;
   for (std::size_t first = 0; first < count; first += 8) {
     const std::size_t here = std::min<std::size_t>(8, count - first);
-    for (std::size_t i = 0; i < 8; ++i) center_W[i] = block_center_W(block_at(order_[first + std::min(i, here - 1)]));
+    for (std::size_t i = 0; i < 8; ++i)
+      center_W[i] = block_center_W(block_at(order_[first + std::min(i, here - 1)]));
     const EightSeen eight = see_blocks(cameras_, kBlockLevel, center_W);
     ++work.units;
     for (std::size_t i = 0; i < here; ++i) {
@@ -155,7 +160,8 @@ std::size_t BrickMap::clear_blocks(std::size_t count, const IntegrationRequest& 
           free_brick(2 * block.x + (child & 1), 2 * block.y + ((child >> 1) & 1), 2 * block.z + (child >> 2));
         work.volume_m3 += volume_m3(kBlockLevel);
       } else if (((eight.mixed >> i) & 1U) != 0 && request.level < kBlockLevel) {
-        if (!clear_bricks(block, eight.cameras[i], std::max(request.level, 0), budget, work)) return first + i;
+        if (!clear_bricks(block, eight.cameras[i], std::max(request.level, 0), budget, work))
+          return first + i;
       }
       if (work.volume_m3 >= request.volume_m3) return first + i + 1;
     }
@@ -184,7 +190,8 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, double reach_m, c
     for (int v = 0; v < frame.height; ++v) {
       const Vector3 ray_C(1.0, pitch * (0.5 - 0.5 / frame.width), pitch * (0.5 - (v + 0.5) / frame.height));
       const Vector3 first = posed.X_WC.R_RT * ray_C / kFinestCell_m;
-      for (int axis = 0; axis < 3; ++axis) line.first[static_cast<std::size_t>(axis)] = static_cast<float>(first[axis]);
+      for (int axis = 0; axis < 3; ++axis)
+        line.first[static_cast<std::size_t>(axis)] = static_cast<float>(first[axis]);
       const std::size_t width = frame.width;
       end_cells(line, frame.depth_m.subspan(static_cast<std::size_t>(v) * width, width), frame.range_m, row_);
       for (std::size_t n = 0; n < row_.count; ++n) {
@@ -234,7 +241,8 @@ Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget&
   vehicle_W_ = cameras_.camera[0].p_WC;
   const std::size_t count = order_blocks(request);
   const std::size_t done = clear_blocks(count, request, budget, result.work);
-  const double reach_m = done < count && done > 0 ? order_key_[order_[done - 1]] * kOrderStep_m : (done < count ? 0.0 : 1e18);
+  const double reach_m =
+      done < count && done > 0 ? order_key_[order_[done - 1]] * kOrderStep_m : (done < count ? 0.0 : 1e18);
   free_vehicle();
   add_surfaces(request, reach_m, result.work);
   refresh_dirty();

@@ -26,8 +26,8 @@ using Entry = DepthPyramid::Entry;
 
 Entry entry_of(float visible_m, float range_m, float steps_per_m) noexcept {
   // The whole range is its own step: what is empty up to the range satisfies every need within it.
-  const std::int32_t least = visible_m < range_m ? static_cast<std::int32_t>(visible_m * steps_per_m)
-                                                 : DepthPyramid::kMaxSteps;
+  const std::int32_t least =
+      visible_m < range_m ? static_cast<std::int32_t>(visible_m * steps_per_m) : DepthPyramid::kMaxSteps;
   const std::int32_t most = visible_m < range_m ? least + 1 : DepthPyramid::kMaxSteps;
   return {static_cast<std::int16_t>(least), static_cast<std::int16_t>(DepthPyramid::kMaxSteps - most)};
 }

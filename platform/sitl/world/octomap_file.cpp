@@ -1,3 +1,5 @@
+#include "platform/sitl/world/octomap_file.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,7 +11,6 @@
 #include <vector>
 
 #include "platform/sitl/world/input_error.hpp"
-#include "platform/sitl/world/octomap_file.hpp"
 #include "platform/sitl/world/world_file.hpp"
 
 namespace roborun::sitl {
@@ -156,9 +157,10 @@ OctomapLeaves read_octomap(std::span<const unsigned char> bytes, bool full, cons
   map.resolution_m = header.resolution_m;
   // File order is Morton order, because children come by number: x, then y, then z.
   walk(bytes.subspan(header.data), full, name, [&](const Leaf& leaf, bool occupied) {
-    map.leaves.push_back({octomap_morton({static_cast<std::int32_t>(leaf.first[0]), static_cast<std::int32_t>(leaf.first[1]),
-                                          static_cast<std::int32_t>(leaf.first[2])}),
-                          static_cast<std::int32_t>(leaf.size), occupied});
+    map.leaves.push_back(
+        {octomap_morton({static_cast<std::int32_t>(leaf.first[0]), static_cast<std::int32_t>(leaf.first[1]),
+                         static_cast<std::int32_t>(leaf.first[2])}),
+         static_cast<std::int32_t>(leaf.size), occupied});
   });
   if (map.leaves.empty()) refuse(name, "the OctoMap tree is empty: no leaf is known");
   return map;

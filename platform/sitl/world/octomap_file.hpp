@@ -12,17 +12,19 @@
 
 namespace roborun::sitl {
 
-inline constexpr int kOctomapDepth = 16;  ///< Levels below the root; 2^16 cells of the resolution on each axis.
+inline constexpr int kOctomapDepth =
+    16;  ///< Levels below the root; 2^16 cells of the resolution on each axis.
 
-/// A cube of one state. Positions count cells of the resolution from the lowest corner; the origin of the world
-/// is at 2^15.
+/// A cube of one state. Positions count cells of the resolution from the lowest corner; the origin of the
+/// world is at 2^15.
 struct OctomapLeaf {
   std::uint64_t morton{};  ///< Of the first cell, x lowest: the leaf is [morton, morton + size^3).
   std::int32_t size{1};    ///< Cells on an edge, a power of two.
   bool occupied{};
 
   [[nodiscard]] std::uint64_t end() const noexcept {
-    return morton + static_cast<std::uint64_t>(size) * static_cast<std::uint64_t>(size) * static_cast<std::uint64_t>(size);
+    return morton + static_cast<std::uint64_t>(size) * static_cast<std::uint64_t>(size) *
+                        static_cast<std::uint64_t>(size);
   }
 };
 
@@ -43,9 +45,10 @@ struct OctomapLeaves {
 
 /// Format by extension: true for .ot, false for .bt; InputError for anything else.
 [[nodiscard]] bool is_full_octomap(const std::string& path);
-/// A file in memory (.ot if `full`, otherwise .bt). Iterative, at most 16 levels deep; memory is bounded by the
-/// number of bytes. Throws InputError for what is truncated, too long, too deep, empty or not OctoMap.
-[[nodiscard]] OctomapLeaves read_octomap(std::span<const unsigned char> bytes, bool full, const std::string& name);
+/// A file in memory (.ot if `full`, otherwise .bt). Iterative, at most 16 levels deep; memory is bounded by
+/// the number of bytes. Throws InputError for what is truncated, too long, too deep, empty or not OctoMap.
+[[nodiscard]] OctomapLeaves read_octomap(std::span<const unsigned char> bytes, bool full,
+                                         const std::string& name);
 /// At most 64 MiB from disk. Throws InputError.
 [[nodiscard]] OctomapLeaves load_octomap(const std::string& path);
 /// The bytes of a file. .ot holds the log-odds of OctoMap's clamping limits (0.97 and 0.12). Precondition:

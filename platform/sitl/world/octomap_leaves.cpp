@@ -33,14 +33,16 @@ void put_float(std::string& out, float value) {
 std::size_t put_nodes(const std::vector<OctomapLeaf>& leaves, bool full, std::string& out) {
   // For the value of an inner node: how many occupied leaves come before the i-th.
   std::vector<std::size_t> occupied(leaves.size() + 1, 0);
-  for (std::size_t i = 0; i < leaves.size(); ++i) occupied[i + 1] = occupied[i] + (leaves[i].occupied ? 1U : 0U);
+  for (std::size_t i = 0; i < leaves.size(); ++i)
+    occupied[i + 1] = occupied[i] + (leaves[i].occupied ? 1U : 0U);
   std::size_t nodes = 0;
   std::vector<Subtree> stack{{0, leaves.size(), 0, 0}};
   while (!stack.empty()) {
     const Subtree node = stack.back();
     stack.pop_back();
     ++nodes;
-    const bool is_leaf = node.end - node.begin == 1 && leaves[node.begin].end() - leaves[node.begin].morton == cells_at(node.depth);
+    const bool is_leaf = node.end - node.begin == 1 &&
+                         leaves[node.begin].end() - leaves[node.begin].morton == cells_at(node.depth);
     unsigned present = 0;  // .ot: a bit a child
     unsigned codes = 0;    // .bt: two bits a child
     std::array<Subtree, 8> inner{};
@@ -87,7 +89,8 @@ std::uint64_t octomap_morton(const std::array<std::int32_t, 3>& cell) noexcept {
   std::uint64_t morton = 0;
   for (unsigned bit = 0; bit < kOctomapDepth; ++bit)
     for (unsigned axis = 0; axis < 3; ++axis)
-      morton |= ((static_cast<std::uint64_t>(static_cast<std::uint32_t>(cell[axis])) >> bit) & 1U) << (3U * bit + axis);
+      morton |= ((static_cast<std::uint64_t>(static_cast<std::uint32_t>(cell[axis])) >> bit) & 1U)
+                << (3U * bit + axis);
   return morton;
 }
 
@@ -138,9 +141,11 @@ bool is_full_octomap(const std::string& path) {
 std::string write_octomap(const OctomapLeaves& map, bool full) {
   std::string data;
   const std::size_t nodes = put_nodes(map.leaves, full, data);
-  return fmt::format("# Octomap OcTree {}file\n# (feel free to add / change comments, but leave the first line as it is!)\n#\n"
-                     "id OcTree\nsize {}\nres {}\ndata\n",
-                     full ? "" : "binary ", nodes, map.resolution_m) +
+  return fmt::format(
+             "# Octomap OcTree {}file\n# (feel free to add / change comments, but leave the first line as it "
+             "is!)\n#\n"
+             "id OcTree\nsize {}\nres {}\ndata\n",
+             full ? "" : "binary ", nodes, map.resolution_m) +
          data;
 }
 
@@ -160,7 +165,9 @@ OctomapDifference diff(const OctomapLeaves& first, const OctomapLeaves& second) 
     if (b != nullptr) next = std::min(next, in_b ? b->end() : b->morton);
     const std::uint64_t cells = next - at;
     if (in_a && in_b) {
-      (a->occupied == b->occupied ? result.same : (b->occupied ? result.free_to_occupied : result.occupied_to_free)) += cells;
+      (a->occupied == b->occupied ? result.same
+                                  : (b->occupied ? result.free_to_occupied : result.occupied_to_free)) +=
+          cells;
     } else if (in_a) {
       result.only_first += cells;
     } else if (in_b) {

@@ -86,19 +86,23 @@ TEST_F(BlockSight, ABlockIsFreeOnlyIfEveryRayThroughItSeesPastIt) {
   for (int n = 0; n < 4000; ++n) {
     const int level = 1 + static_cast<int>(rng.below(4));
     std::array<Vector3, 8> center_W;
-    for (Vector3& c : center_W) c = frames_[0].X_WC * Vector3(rng.uniform(0, 18), rng.uniform(-9, 9), rng.uniform(-9, 9));
+    for (Vector3& c : center_W)
+      c = frames_[0].X_WC * Vector3(rng.uniform(0, 18), rng.uniform(-9, 9), rng.uniform(-9, 9));
     const EightSeen seen = see_blocks(cameras, level, center_W);
     for (unsigned i = 0; i < 8; ++i) {
       if (((seen.free >> i) & 1U) == 0) continue;
       ++free_blocks;
       for (int k = 0; k < 20; ++k) {
         const double half = 0.5 * cell_size_m(level);
-        const Vector3 p_W = center_W[i] + half * Vector3(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1));
+        const Vector3 p_W =
+            center_W[i] + half * Vector3(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1));
         const Vector3 p_C = frames_[0].X_WC.inverse_times(p_W);
         ASSERT_GT(p_C.x(), 0.0);
-        const int u = static_cast<int>((1.0 - p_C.y() / p_C.x()) * 22.5), v = static_cast<int>((1.0 - p_C.z() / p_C.x()) * 22.5);
+        const int u = static_cast<int>((1.0 - p_C.y() / p_C.x()) * 22.5),
+                  v = static_cast<int>((1.0 - p_C.z() / p_C.x()) * 22.5);
         ASSERT_TRUE(u >= 0 && u < 45 && v >= 0 && v < 45) << "a block that leaves the image is not free";
-        ASSERT_GE(static_cast<double>(frames_[0].frame.depth_m[static_cast<std::size_t>(v * 45 + u)]), p_C.x());
+        ASSERT_GE(static_cast<double>(frames_[0].frame.depth_m[static_cast<std::size_t>(v * 45 + u)]),
+                  p_C.x());
         ++rays;
       }
     }
@@ -129,7 +133,8 @@ TEST_F(BlockSight, TheCellsOfARowAreWhereItsPixelsEnd) {
   ASSERT_GT(row->count, 5U);
   std::size_t found = 0;
   for (std::size_t n = 0; n < row->count; ++n) {
-    const Vector3 corner_W(0.3 * (row->cell[0][n] - 300), 0.3 * (row->cell[1][n] - 300), 0.3 * (row->cell[2][n] - 300));
+    const Vector3 corner_W(0.3 * (row->cell[0][n] - 300), 0.3 * (row->cell[1][n] - 300),
+                           0.3 * (row->cell[2][n] - 300));
     for (int u = 0; u < 45; ++u) {
       const double depth_m = static_cast<double>(depths[static_cast<std::size_t>(u)]);
       const Vector3 p_W = down.X_WC * (depth_m * Vector3(1.0, 1.0 - (u + 0.5) * pitch, 1.0 - 22.5 * pitch));
