@@ -93,8 +93,8 @@ inline constexpr std::array<SlotSpec, kSlotCount> kFrameTable = [] {
     {SlotId::kPublish,     "publish",      L::kFlight,      us(200), P::kSkip,       1, false},  // to the other lanes
 
     {SlotId::kGather,      "gather",       L::kDecision,    ms(20),  P::kDegrade,    1, false},  // newest frames and state
-    {SlotId::kPointCloud,  "point_cloud",  L::kDecision,    ms(600), P::kDegrade,    1, true},
-    {SlotId::kGovernor,    "governor",     L::kDecision,    ms(200), P::kDegrade,    1, true},
+    {SlotId::kPointCloud,  "point_cloud",  L::kDecision,    ms(1500), P::kDegrade,   1, true},   // four times the slowest board known
+    {SlotId::kGovernor,    "governor",     L::kDecision,    ms(400), P::kDegrade,    1, true},
     {SlotId::kMap,         "map",          L::kDecision,    ms(15000), P::kDegrade,  1, true},
     {SlotId::kExport,      "export",       L::kDecision,    ms(15000), P::kDegrade,  1, true},
     {SlotId::kPlanner,     "planner",      L::kDecision,    ms(15000), P::kDegrade,  1, true},
