@@ -112,6 +112,12 @@ FrameVerdict Reassembler::receive(const CanFrame& frame, Transfer& transfer) noe
   return verdict;
 }
 
+std::size_t Reassembler::unfinished() const noexcept {
+  std::size_t count = 0;
+  for (const Session& session : sessions_) count += session.receiving ? 1U : 0U;
+  return count;
+}
+
 FrameVerdict Reassembler::take(const CanFrame& frame, Transfer& transfer) noexcept {
   TransferHeader header = from_can_id(frame.id);
   const auto type = std::ranges::find_if(

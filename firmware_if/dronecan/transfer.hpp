@@ -136,6 +136,8 @@ class Reassembler {
   /// `transfer` is written with kDelivered only. Time is frame.stamp.
   [[nodiscard]] FrameVerdict receive(const CanFrame& frame, Transfer& transfer) noexcept;
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+  /// Transfers started and neither completed nor given up. O(sessions).
+  [[nodiscard]] std::size_t unfinished() const noexcept;
   void set_local_node_id(std::uint8_t node_id) noexcept { local_node_id_ = node_id; }
 
  private:

@@ -8,6 +8,7 @@
 #include <functional>
 #include <string>
 
+#include "platform/app/can_command.hpp"
 #include "platform/app/fly_command.hpp"
 #include "platform/sitl/world/input_error.hpp"
 
@@ -29,13 +30,14 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   app.set_version_flag("--version", "roborun 0.1.0");
   std::function<int()> run;
   roborun::app::add_fly_command(app, run);
+  roborun::app::add_can_command(app, run);
   try {
     app.parse(argc, argv);
     return run ? run() : 2;
   } catch (const CLI::Success& done) {
     return app.exit(done);  // --help and --version
   } catch (const CLI::ParseError& error) {
-    return complain(fmt::format("{} (see roborun fly --help)", error.what()));
+    return complain(fmt::format("{} (see roborun --help)", error.what()));
   } catch (const roborun::sitl::InputError& error) {
     return complain(error.what());
   } catch (const std::exception& error) {
