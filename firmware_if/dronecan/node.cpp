@@ -49,6 +49,8 @@ bool AllocationClient::poll(MonotonicTime now, Allocation& request) noexcept {
 }
 
 std::uint8_t AllocationClient::take(const Allocation& answer, MonotonicTime now) noexcept {
+  // The specification allows 0 .. 400 ms; the transmit gate takes one a 100 ms.
+  constexpr Nanos kFollowUpShortest{100'000'000};
   constexpr Nanos kFollowUpLongest{400'000'000};
   // Whoever asks, all others wait: a period from now.
   scheduled_ = true;
@@ -60,7 +62,7 @@ std::uint8_t AllocationClient::take(const Allocation& answer, MonotonicTime now)
     return 0;
   if (known == unique_id_.size()) return answer.node_id;
   confirmed_bytes_ = static_cast<std::uint8_t>(known);
-  next_ = now + random(Nanos{0}, kFollowUpLongest);
+  next_ = now + random(kFollowUpShortest, kFollowUpLongest);
   return 0;
 }
 

@@ -12,6 +12,7 @@
 #include "core/geometry/math.hpp"
 #include "core/memory/arena.hpp"
 #include "core/record/state_hash.hpp"
+#include "platform/app/actuator_link.hpp"
 #include "platform/app/backends.hpp"
 #include "platform/app/decision_pipeline.hpp"
 #include "platform/app/flight_lane.hpp"
@@ -70,6 +71,7 @@ class MissionRun {
   std::optional<governor::Governor> governor_;
   std::optional<DecisionPipeline> pipeline_;
   FlightLane flight_;
+  ActuatorLink actuators_;
 
   std::optional<DecisionOutput> pending_;  ///< Computed, not yet there in virtual time.
   MonotonicTime pending_at_{};
@@ -89,7 +91,8 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
       vehicle_(config.vehicle, config.wind, Vector3(world.start_W().x(), world.start_W().y(), 0.0),
                config.seed),
       sensors_(config.sensors, config.seed),
-      flight_({}, {}) {
+      flight_({}, {}),
+      actuators_(config.seed) {
   const auto mounts = sitl::six_camera_mounts();
   cameras_.reserve(mounts.size());
   for (std::size_t i = 0; i < mounts.size(); ++i) {
@@ -128,7 +131,11 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
 }
 
 void MissionRun::step_world() {
-  vehicle_.step(kMinorFrame);
+  // What was sent at the end of a minor frame reaches the motors in the middle of the next one: four
+  // throttles are on the bus for 0.13 ms, and an ESC has a cycle of its own.
+  vehicle_.step(kMinorFrame / 2);
+  actuators_.advance(now_ + kMinorFrame / 2, vehicle_);
+  vehicle_.step(kMinorFrame / 2);
   now_ += kMinorFrame;
   sensors_.sample(now_, vehicle_.state());
   const Pose X_WB = vehicle_.X_WB();
@@ -286,7 +293,8 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
   for (std::uint64_t frame = 0; reason == nullptr; ++frame) {
     const Vector3 before_W = vehicle_.state().p_WB;
     step_world();
-    flight_.step(now_, sensors_, vehicle_);
+    flight_.step(now_, sensors_, actuators_);
+    actuators_.step(now_);
     finish_decision();
     start_decision();
     const sitl::VehicleState& s = vehicle_.state();

@@ -51,7 +51,7 @@ refuses() {
 }
 refuses "from -8192 to 8191" '{"type":"uavcan.equipment.esc.RawCommand","source_node_id":3,"fields":{"cmd":[9000]}}'
 refuses "at most 20 items" "{\"type\":\"uavcan.equipment.esc.RawCommand\",\"source_node_id\":3,\"fields\":{\"cmd\":[$(printf '1,%.0s' {1..20})1]}}"
-refuses "'x' is unknown" '{"type":"x","source_node_id":3}'
+refuses "'x' (message) is unknown" '{"type":"x","source_node_id":3}'
 refuses "source_node_id must be" '{"type":"uavcan.protocol.NodeStatus","source_node_id":200}'
 refuses "'fields.nope' is unknown" '{"type":"uavcan.protocol.NodeStatus","source_node_id":2,"fields":{"nope":1}}'
 refuses "line 1" '{broken'
