@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -9,11 +10,13 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
-#include "firmware_if/dronecan/transfer.hpp"
+#include "firmware_if/dronecan/node.hpp"
 #include "platform/can/candump.hpp"
 #include "platform/can/message_json.hpp"
+#include "platform/can/socket_can.hpp"
 #include "platform/sitl/world/input_error.hpp"
 
 namespace roborun::app {
@@ -223,17 +226,129 @@ int encode(const std::string& path) {
   return 0;
 }
 
+MonotonicTime now() {
+  return MonotonicTime{
+      std::chrono::duration_cast<Nanos>(std::chrono::steady_clock::now().time_since_epoch())};
+}
+
+void open_or_refuse(can::SocketCan& bus, const std::string& interface) {
+  if (const std::string why = bus.open(interface); !why.empty()) throw sitl::InputError(why);
+}
+
+int monitor(const std::string& interface, bool json, double duration_s) {
+  can::SocketCan bus;
+  open_or_refuse(bus, interface);
+  Decoder decoder("roborun can monitor: ", json);
+  can::LogLine line{.interface = interface, .frame = {}, .data_frame = true};
+  const MonotonicTime end = now() + from_seconds(duration_s);
+  while (now() < end) {
+    const Status status = bus.receive(line.frame);
+    if (status == Status::kOk) {
+      decoder.take(line, fmt::format("{:.6f}", seconds(line.frame.stamp.time_since_epoch())));
+      continue;
+    }
+    (void)std::fflush(stdout);
+    std::this_thread::sleep_for(std::chrono::milliseconds{1});
+    if (status == Status::kIo) (void)bus.reopen();
+  }
+  decoder.summarise();
+  const firmware_if::CanCounters& c = bus.counters();
+  fmt::print(
+      stderr,
+      "{}: {} frames, {} lost in the queue, {} times bus-off, {} error-passive, {} without acknowledge\n",
+      interface, c.received, c.lost_on_receive, c.bus_off, c.error_passive, c.no_acknowledge);
+  return 0;
+}
+
+/// Bench only: one throttle on all ESCs for a while, through the same node and gate that fly; zeros before
+/// and after.
+int send_esc(const std::string& interface, bool props_off, int count, double throttle_ratio,
+             double duration_s) {
+  if (!props_off)
+    throw sitl::InputError("send-esc turns motors: take the propellers off and say so with --props-off");
+  can::SocketCan bus;
+  open_or_refuse(bus, interface);
+  const auto esc_count = static_cast<std::uint8_t>(count);
+  firmware_if::TransmitGate gate({.esc_count = esc_count}, bus);
+  std::vector<dc::Reassembler::Session> sessions(32);
+  dc::Node node({.node_id = 10, .esc_count = esc_count}, gate, bus, sessions);
+  const std::vector<double> thrust(static_cast<std::size_t>(count), throttle_ratio);
+  const auto run_for = [&](double s) {
+    for (const MonotonicTime end = now() + from_seconds(s); now() < end;) {
+      const MonotonicTime t = now();
+      gate.beat(t);
+      (void)node.step(t, {.cycle_ok = true, .armed = true, .thrust_ratio = thrust});
+      std::this_thread::sleep_for(std::chrono::microseconds{2500});
+    }
+  };
+  run_for(0.5);  // disarmed: zeros, so that the ESCs are ready
+  (void)gate.arm();
+  run_for(duration_s);
+  gate.disarm();
+  run_for(0.5);
+  fmt::print("{} commands sent, {} refused\n", node.counters().commands, node.counters().commands_refused);
+  for (int i = 0; i < count; ++i) {
+    const auto& esc = node.inbox().esc.at(static_cast<std::size_t>(i));
+    if (esc.count == 0) {
+      fmt::print("ESC {}: silent\n", i);
+    } else {
+      fmt::print("ESC {}: node {}, {} rpm, {:.1f} V, {:.1f} A, {} errors\n", i, esc.source_node_id,
+                 esc.message.rpm, esc.message.voltage, esc.message.current, esc.message.error_count);
+    }
+  }
+  return node.counters().commands_refused == 0 ? 0 : 1;
+}
+
 struct CanOptions {
   std::string candump;
   bool json{false};
   std::string encode_file;
+  std::string interface;
+  double seconds{1e9};
+  bool props_off{false};
+  int esc_count{4};
+  double throttle_ratio{0.05};
 };
+
+void add_bus_commands(CLI::App& can_app, const std::shared_ptr<CanOptions>& options,
+                      std::function<int()>& run) {
+  CLI::App* monitor_app = can_app.add_subcommand(
+      "monitor", "As decode, live from a SocketCAN interface; counts of errors at the end");
+  monitor_app->add_option("interface", options->interface, "can0")->required();
+  monitor_app->add_flag("--json", options->json, "As of decode");
+  monitor_app->add_option("--seconds", options->seconds, "Stop after so long; default: never")
+      ->check(CLI::Range(0.0, 1e9));
+  monitor_app->callback([options, &run] {
+    run = [options] { return monitor(options->interface, options->json, options->seconds); };
+  });
+
+  CLI::App* esc_app = can_app.add_subcommand(
+      "send-esc",
+      "Bench only, without propellers: one throttle on all ESCs for a while, zeros before and after");
+  esc_app->add_option("interface", options->interface, "can0")->required();
+  esc_app->add_flag("--props-off", options->props_off, "The propellers are off");
+  esc_app->add_option("--count", options->esc_count, "How many ESCs")
+      ->check(CLI::Range(1, 20))
+      ->capture_default_str();
+  esc_app->add_option("--throttle", options->throttle_ratio, "0 .. 0.3 of full throttle")
+      ->check(CLI::Range(0.0, 0.3))
+      ->capture_default_str();
+  esc_app->add_option("--seconds", options->seconds, "How long, 0.1 .. 60")
+      ->required()
+      ->check(CLI::Range(0.1, 60.0));
+  esc_app->callback([options, &run] {
+    run = [options] {
+      return send_esc(options->interface, options->props_off, options->esc_count, options->throttle_ratio,
+                      options->seconds);
+    };
+  });
+}
 
 }  // namespace
 
 void add_can_command(CLI::App& app, std::function<int()>& run) {
   auto options = std::make_shared<CanOptions>();
-  CLI::App* can_app = app.add_subcommand("can", "DroneCAN tools: decode and encode candump logs");
+  CLI::App* can_app = app.add_subcommand("can", "DroneCAN tools: decode, encode, monitor, try ESCs");
   can_app->require_subcommand(1);
 
   CLI::App* decode_app =
@@ -258,6 +373,7 @@ void add_can_command(CLI::App& app, std::function<int()>& run) {
   encode_app->add_option("--json", options->encode_file, "File to read; default: standard input")
       ->expected(0, 1);
   encode_app->callback([options, &run] { run = [options] { return encode(options->encode_file); }; });
+  add_bus_commands(*can_app, options, run);
 }
 
 }  // namespace roborun::app

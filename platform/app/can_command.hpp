@@ -1,4 +1,4 @@
-/// `roborun can`: DroneCAN at the desk: decode and encode candump logs.
+/// `roborun can`: DroneCAN at the desk: decode and encode candump logs, monitor a bus, try ESCs on the bench.
 #pragma once
 
 #include <CLI/CLI.hpp>

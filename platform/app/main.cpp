@@ -10,6 +10,7 @@
 
 #include "platform/app/can_command.hpp"
 #include "platform/app/fly_command.hpp"
+#include "platform/app/gpio_command.hpp"
 #include "platform/sitl/world/input_error.hpp"
 
 namespace {
@@ -31,6 +32,7 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   std::function<int()> run;
   roborun::app::add_fly_command(app, run);
   roborun::app::add_can_command(app, run);
+  roborun::app::add_gpio_command(app, run);
   try {
     app.parse(argc, argv);
     return run ? run() : 2;

@@ -36,6 +36,10 @@ refuses "must end in .toml, .bt or .ot" fly --world nope.xyz
 refuses "X,Y,Z" fly --world "$data/worlds/two_pillars.toml" --start 1,2
 refuses "cannot be opened" fly --settings nope.toml
 refuses "--nope" fly --nope
+refuses "--props-off" can send-esc can0 --seconds 1
+refuses "nocan7" can monitor nocan7
+refuses "cannot be opened" can decode --candump nope.log
+refuses "required" gpio check --open x
 refuses "subcommand" 
 printf '[world]\nbounds = [[0,0,0],[9,9,9]]\nstart = [1,1,1]\ngoal = [5,5,5]\nwalls = 3\n' >/tmp/roborun_bad.$$.toml
 refuses ":5: walls: unknown key" fly --world /tmp/roborun_bad.$$.toml
