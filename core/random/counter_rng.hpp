@@ -29,12 +29,8 @@ class CounterRng {
   double uniform(double low, double high) noexcept { return low + (high - low) * uniform(); }
   /// In [0, count); 0 for count 0. Bias below count / 2^64.
   std::uint64_t below(std::uint64_t count) noexcept {
-    // The upper half of the 128-bit product, from 32-bit halves: not every ARM has a 128-bit integer.
-    constexpr std::uint64_t kLow = 0xffffffffU;
-    const std::uint64_t a = next();
-    const std::uint64_t first = (a >> 32U) * (count & kLow) + (((a & kLow) * (count & kLow)) >> 32U);
-    const std::uint64_t second = (a & kLow) * (count >> 32U) + (first & kLow);
-    return (a >> 32U) * (count >> 32U) + (first >> 32U) + (second >> 32U);
+    __extension__ using Wide = unsigned __int128;
+    return static_cast<std::uint64_t>((static_cast<Wide>(next()) * count) >> 64U);
   }
   /// Standard normal by Box and Muller; two draws each, so that the position never depends on earlier calls.
   double normal() noexcept {

@@ -106,6 +106,13 @@ SocketCan::~SocketCan() {
 
 std::string SocketCan::open(const std::string& interface) {
   interface_ = interface;
+  std::string why = connect();
+  if (why.empty()) state_ = CanState::kActive;
+  return why;
+}
+
+std::string SocketCan::connect() {
+  const std::string& interface = interface_;
   const int fd = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
   if (fd < 0) return fmt::format("{}: this kernel has no CAN sockets ({})", interface, std::strerror(errno));
   if (const std::string why = prepare(fd, interface); !why.empty()) {
@@ -114,13 +121,12 @@ std::string SocketCan::open(const std::string& interface) {
   }
   const int old = socket_.exchange(fd);
   if (old >= 0) (void)close(old);
-  state_ = CanState::kActive;
   return {};
 }
 
 Status SocketCan::reopen() {
   if (socket_.load() >= 0) return Status::kOk;
-  return open(interface_).empty() ? Status::kOk : Status::kIo;
+  return connect().empty() ? Status::kOk : Status::kIo;
 }
 
 Status SocketCan::lose(int error) noexcept {
@@ -200,7 +206,8 @@ Status SocketCan::receive(CanFrame& frame) noexcept {
       } else if (c->cmsg_type == SO_RXQ_OVFL) {
         std::uint32_t overflow = 0;
         std::memcpy(&overflow, CMSG_DATA(c), sizeof(overflow));
-        counters_.lost_on_receive += overflow - overflow_seen_;
+        // A new socket counts from zero again.
+        counters_.lost_on_receive += overflow >= overflow_seen_ ? overflow - overflow_seen_ : overflow;
         overflow_seen_ = overflow;
       }
     }

@@ -42,7 +42,8 @@ class SocketCan final : public firmware_if::CanBus {
 
   /// Empty: opened. Otherwise what is wrong, in one line. Not for the loop.
   [[nodiscard]] std::string open(const std::string& interface);
-  /// Opens the same interface again, from a thread that is not the loop's. kIo: still not there.
+  /// Opens the same interface again, from a thread that is not the loop's; the loop's state() follows with
+  /// the next frame. kIo: still not there.
   [[nodiscard]] Status reopen();
 
   [[nodiscard]] Status send(std::span<const firmware_if::CanFrame> transfer) noexcept override;
@@ -51,6 +52,7 @@ class SocketCan final : public firmware_if::CanBus {
   [[nodiscard]] const firmware_if::CanCounters& counters() const noexcept override { return counters_; }
 
  private:
+  [[nodiscard]] std::string connect();
   void note(const CanErrorReport& report) noexcept;
   Status lose(int error) noexcept;
 
