@@ -1,4 +1,4 @@
-# Cross-build for aarch64: the distribution's compiler, a sysroot made by toolchain/sysroot arm64, tests under qemu-user.
+# Cross-build for aarch64: the distribution's compiler, a sysroot made by toolchain/sysroot, tests under qemu-user.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_SYSTEM_PROCESSOR aarch64)
 set(CMAKE_CXX_COMPILER aarch64-linux-gnu-g++)
