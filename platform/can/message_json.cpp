@@ -175,7 +175,8 @@ void read_value(const Json& in, typename Wire::Value& value, const std::string& 
       if (byte >= 0x80) {
         const bool two = (byte == 0xc2 || byte == 0xc3) && i + 1 < text.size();
         if (!two) refuse(name, in, "a text of code points below U+0100");
-        byte = static_cast<std::uint8_t>((byte << 6U) | (static_cast<std::uint8_t>(text[++i]) & 0x3fU));
+        byte = static_cast<std::uint8_t>((unsigned{byte} << 6U) |
+                                         (static_cast<unsigned char>(text[++i]) & 0x3fU));
       }
       if (!value.push_back(byte)) refuse(name, in, fmt::format("at most {} bytes", value.items.size()));
     }
