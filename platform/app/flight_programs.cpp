@@ -26,7 +26,8 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
       flight_.commit(now);
       return;
     case SlotId::kTrack:
-      flight_.track(now, aircraft_.vehicle);
+      flight_.track(now, aircraft_.actuators);
+      aircraft_.actuators.step(now);
       return;
     case SlotId::kPublish: {
       FlightReport& report = mail_.report.draft();

@@ -71,7 +71,7 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
       rig_(world, config.camera, config.seed),
       aircraft_{sitl::Vehicle(config.vehicle, config.wind,
                               Vector3(world.start_W().x(), world.start_W().y(), 0.0), config.seed),
-                sitl::NavigationSensors(config.sensors, config.seed), rig_},
+                sitl::NavigationSensors(config.sensors, config.seed), rig_, ActuatorLink(config.seed)},
       meter_(costs_, decision_clock_),
       system_(world, config, meter_, aircraft_, rig_.cameras()),
       flight_lane_(core::LaneId::kFlight, flight_clock_, system_.flight_program(), reactions_, nullptr),

@@ -122,7 +122,8 @@ RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
       cameras_(world, config.mission.camera, config.mission.seed),
       aircraft_{sitl::Vehicle(config.mission.vehicle, config.mission.wind,
                               Vector3(world.start_W().x(), world.start_W().y(), 0.0), config.mission.seed),
-                sitl::NavigationSensors(config.mission.sensors, config.mission.seed), cameras_},
+                sitl::NavigationSensors(config.mission.sensors, config.mission.seed), cameras_,
+                ActuatorLink(config.mission.seed)},
       system_(world, config.mission, meter_, aircraft_, cameras_.cameras()),
       program_{Injected{system_.flight_program(), config.inject},
                Injected{system_.decision_program(), config.inject}, Injected{cameras_, config.inject}},
@@ -287,7 +288,8 @@ report::AuditReport run_real_time(const sitl::World& world, const RealTimeConfig
 std::vector<report::PoolUse> memory_plan_of(const sitl::World& world, const MissionConfig& config) {
   CameraRig rig(world, config.camera, config.seed);
   SimulatedAircraft aircraft{sitl::Vehicle(config.vehicle, config.wind, world.start_W(), config.seed),
-                             sitl::NavigationSensors(config.sensors, config.seed), rig};
+                             sitl::NavigationSensors(config.sensors, config.seed), rig,
+                             ActuatorLink(config.seed)};
   core::ClockMeter meter;
   const auto system = std::make_unique<FlightSystem>(world, config, meter, aircraft, rig.cameras());
   return system->pools();

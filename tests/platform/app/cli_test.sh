@@ -42,6 +42,10 @@ refuses "must end in .toml, .bt or .ot" fly --world nope.xyz
 refuses "X,Y,Z" fly --world "$data/worlds/two_pillars.toml" --start 1,2
 refuses "cannot be opened" fly --settings nope.toml
 refuses "--nope" fly --nope
+refuses "--props-off" can send-esc can0 --seconds 1
+refuses "nocan7" can monitor nocan7
+refuses "cannot be opened" can decode --candump nope.log
+refuses "required" gpio check --open x
 refuses "subcommand" 
 refuses "1 to 86400" audit --seconds 0
 refuses "SLOT:MILLISECONDS" audit --inject-spin nope:5
