@@ -235,7 +235,8 @@ void Node::command(MonotonicTime now, const Input& in) noexcept {
     const double ratio = usable ? in.thrust_ratio[i] : 0.0;
     // The comparison is written so that NaN gives zero.
     const double clamped = ratio > 0.0 ? std::min(ratio, 1.0) : 0.0;
-    (void)raw.cmd.push_back(static_cast<std::int16_t>(clamped * kThrottleFull + 0.5));
+    const double rounded_up = clamped * kThrottleFull + 0.5;
+    (void)raw.cmd.push_back(static_cast<std::int16_t>(rounded_up));
   }
   ++(gate_.send(raw, now) == Status::kOk ? counters_.commands : counters_.commands_refused);
   // The phase is kept; what was missed is not caught up.

@@ -107,7 +107,7 @@ struct Int {
   static constexpr std::int64_t kMost = (std::int64_t{1} << (kBits - 1)) - 1;
 
   static constexpr void write(BitWriter& out, Value value, bool /*tail*/) noexcept {
-    auto wide = static_cast<std::int64_t>(value);
+    std::int64_t wide = value;
     wide = wide > kMost ? kMost : (wide < -kMost - 1 ? -kMost - 1 : wide);
     out.put<kBits>(static_cast<std::uint64_t>(wide));
   }

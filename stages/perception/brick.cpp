@@ -83,7 +83,7 @@ void Brick::add_free(int level, std::uint32_t parent, std::uint8_t blocks) noexc
   }
   const std::size_t count = std::size_t{1} << (3U * static_cast<unsigned>(level));
   for (std::size_t i = 0; i < 8; ++i) {
-    if (((blocks >> i) & 1U) == 0) continue;
+    if (((std::uint32_t{blocks} >> i) & 1U) == 0) continue;
     const std::size_t first = (base + i) * count;
     Word occupied = 0;
     for (std::size_t k = 0; k < count; k += 8) occupied |= ~load(first + k) & kSigns;
