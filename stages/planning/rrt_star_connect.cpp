@@ -31,7 +31,7 @@ std::int32_t RrtStar::advance(Search& s, std::int32_t from) noexcept {
       return from;
     }
     bool moved = false;
-    for (double step_m = config_.step_m; step_m > 0.2 * config_.step_m && !moved; step_m *= 0.5) {
+    for (double step_m = config_.step_m; step_m > 0.3 * config_.step_m && !moved; step_m *= 0.5) {
       const Vector3 p_W = node(from).p_W + way * (step_m / to_goal_m);
       if (!is_segment_free(s.view, node(from).p_W, p_W, s.request.radius_m, s.work.units)) continue;
       from = add_node(p_W, from, s.work);
