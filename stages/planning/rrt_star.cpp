@@ -226,6 +226,17 @@ Status RrtStar::escape(const PlanRequest& request, const MapView& view, PlanResu
   return Status::kStartBlocked;
 }
 
+void RrtStar::clear(Search& s) noexcept {
+  const PlanRequest& request = s.request;
+  count_ = 0;
+  goal_ = -1;
+  std::fill(visited_.begin(), visited_.end(), 0U);
+  const Vector3 reach = Vector3::Constant(request.horizon_m);
+  grid_.reset({request.bounds_W.min_W.cwiseMax(request.start_W - reach),
+               request.bounds_W.max_W.cwiseMin(request.start_W + reach)});
+  add_node(request.start_W, -1, s.work);
+}
+
 Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::StageBudget& budget,
                      PlanResult& result) noexcept {
   result = {};
@@ -240,14 +251,8 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::Stag
   const bool goal_bad = !request.bounds_W.contains(request.goal_W) ||
                         view.at(request.goal_W, work.units) == CellState::kOccupied;
 
-  count_ = 0;
-  goal_ = -1;
-  std::fill(visited_.begin(), visited_.end(), 0U);
-  const Vector3 reach = Vector3::Constant(request.horizon_m);
-  grid_.reset({request.bounds_W.min_W.cwiseMax(request.start_W - reach),
-               request.bounds_W.max_W.cwiseMin(request.start_W + reach)});
   Search s{request, view, budget, work, core::CounterRng(request.seed, 7)};
-  add_node(request.start_W, -1, work);
+  clear(s);
   const Vector3 target_W = towards_goal(request);
   const double to_target_m = (target_W - request.start_W).norm();
   if (to_target_m > kShortEdge_m && target_W == request.goal_W && !goal_bad &&

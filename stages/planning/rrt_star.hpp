@@ -71,6 +71,8 @@ class RrtStar final : public Planner {
 
   [[nodiscard]] Node& node(std::int32_t index) noexcept { return node_[static_cast<std::size_t>(index)]; }
   [[nodiscard]] bool full() const noexcept { return count_ == node_.size(); }
+  /// The tree is the start alone.
+  void clear(Search& s) noexcept;
   std::int32_t add_node(const Vector3& p_W, std::int32_t parent, core::Work& work) noexcept;
   void reparent(std::int32_t child, std::int32_t parent, double cost_m) noexcept;
   /// A step from the nearest node towards the sample, by the best parent, and rewiring; -1 if nothing came of

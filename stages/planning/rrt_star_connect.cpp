@@ -75,13 +75,11 @@ bool RrtStar::find_first(Search& s) noexcept {
     }
     p_W = p_W.cwiseMax(request.bounds_W.min_W).cwiseMin(request.bounds_W.max_W);
     ++failures;
-    if ((p_W - node(from).p_W).norm() < kShortEdge_m ||
-        (p_W - request.start_W).norm() > request.horizon_m ||
+    if ((p_W - node(from).p_W).norm() < kShortEdge_m || (p_W - request.start_W).norm() > request.horizon_m ||
         !is_segment_free(s.view, node(from).p_W, p_W, request.radius_m, s.work.units))
       continue;
     const std::int32_t end = advance(s, add_node(p_W, from, s.work));
-    const double gain_m =
-        (request.goal_W - node(front).p_W).norm() - (request.goal_W - node(end).p_W).norm();
+    const double gain_m = (request.goal_W - node(front).p_W).norm() - (request.goal_W - node(end).p_W).norm();
     if (gain_m < 0.5) continue;
     front = end;
     failures = 0;
@@ -138,8 +136,7 @@ bool RrtStar::splice(Search& s, std::int32_t from, const Path& best_W, double bo
   const double to_goal_m = (s.request.goal_W - from_W).norm();
   for (; at + 1 < best_W.size() && (s.request.goal_W - best_W[at]).norm() > to_goal_m - kShortEdge_m; ++at)
     rest_m -= (best_W[at + 1] - best_W[at]).norm();
-  const double total_m =
-      node_[static_cast<std::size_t>(from)].cost_m + (best_W[at] - from_W).norm() + rest_m;
+  const double total_m = node_[static_cast<std::size_t>(from)].cost_m + (best_W[at] - from_W).norm() + rest_m;
   if (total_m > bound_m || !path_to(from, candidate_W) ||
       !is_segment_free(s.view, from_W, best_W[at], s.request.radius_m, s.work.units))
     return false;
@@ -154,8 +151,7 @@ Status RrtStar::connect(Search& s, PlanResult& result) noexcept {
   const bool found = find_first(s);
   Path best_W;
   if (!found || !path_to(goal_, best_W)) {
-    count_ = 1;
-    goal_ = -1;
+    clear(s);
     return Status::kNoPath;
   }
   double best_m = node(goal_).cost_m;
@@ -189,12 +185,14 @@ Status RrtStar::connect(Search& s, PlanResult& result) noexcept {
         reparent(goal_, added, cost_m);
     }
     Path candidate_W;
-    const bool other = node(goal_).cost_m < before_m - 1e-6
-                           ? path_to(goal_, candidate_W)
-                           : added >= 0 && i % kSpliceEvery == 0 && splice(s, added, best_W, kSlack * best_m, candidate_W);
+    const bool other =
+        node(goal_).cost_m < before_m - 1e-6
+            ? path_to(goal_, candidate_W)
+            : added >= 0 && i % kSpliceEvery == 0 && splice(s, added, best_W, kSlack * best_m, candidate_W);
     if (other || i % kShortenEvery == 0) {
       if (!other) candidate_W = best_W;
-      const double candidate_m = shorten(s.view, request.radius_m, kReach_m, kTries, s.rng, candidate_W, s.work.units);
+      const double candidate_m =
+          shorten(s.view, request.radius_m, kReach_m, kTries, s.rng, candidate_W, s.work.units);
       if (candidate_m < best_m - 1e-9) {
         best_m = candidate_m;
         best_W = candidate_W;

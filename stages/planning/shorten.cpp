@@ -47,8 +47,8 @@ bool cut(const MapView& view, double radius_m, const Place& from, const Place& t
   return true;
 }
 
-/// Drops each inner way-point that is not needed, or moves it towards the line between its neighbours by a random
-/// share of the way.
+/// Drops each inner way-point that is not needed, or moves it towards the line between its neighbours by a
+/// random share of the way.
 void pull(const MapView& view, double radius_m, core::CounterRng& rng, Path& path_W,
           std::uint64_t& lookups) noexcept {
   Path tight;
@@ -64,7 +64,8 @@ void pull(const MapView& view, double radius_m, core::CounterRng& rng, Path& pat
     const double along = length2 > 0.0 ? (p_W - a_W).dot(way) / length2 : 0.0;
     const Vector3 on_line = a_W + std::fmin(std::fmax(along, 0.0), 1.0) * way;
     const Vector3 moved_W = p_W + share * (on_line - p_W);
-    const double gain_m = (p_W - a_W).norm() + (b_W - p_W).norm() - (moved_W - a_W).norm() - (b_W - moved_W).norm();
+    const double gain_m =
+        (p_W - a_W).norm() + (b_W - p_W).norm() - (moved_W - a_W).norm() - (b_W - moved_W).norm();
     const bool better = gain_m > kGain_m && is_segment_free(view, a_W, moved_W, radius_m, lookups) &&
                         is_segment_free(view, moved_W, b_W, radius_m, lookups);
     (void)tight.push_back(better ? moved_W : p_W);

@@ -51,8 +51,7 @@ class OmplPlanner final : public Planner {
     const bool goal_bad = !request.bounds_W.contains(request.goal_W) ||
                           view.at(request.goal_W, work.units) == CellState::kOccupied;
 
-    const ob::SpaceInformationPtr info =
-        make_ompl_space(view, {low, high}, request.radius_m, work.units);
+    const ob::SpaceInformationPtr info = make_ompl_space(view, {low, high}, request.radius_m, work.units);
     // Outside the box or unknown, the goal is moved onto its border: the nearest approximation of it is what
     // is asked for.
     const Vector3 target_W = request.goal_W.cwiseMax(low).cwiseMin(high);
