@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/executive/frame_table.hpp"
 #include "core/memory/static_vector.hpp"
 
 namespace roborun::app {
@@ -15,12 +16,12 @@ constexpr double kCornerRoom_m = 0.25;
 
 }  // namespace
 
-DecisionPipeline::DecisionPipeline(const PipelineConfig& config, const core::CostProfile& costs,
+DecisionPipeline::DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter,
                                    governor::Governor& governor, stages::PointCloud& cloud,
                                    stages::OccupancyMap& map, stages::Planner& planner,
                                    stages::Smoother& smoother) noexcept
     : config_(config),
-      costs_(costs),
+      meter_(meter),
       governor_(governor),
       cloud_(cloud),
       map_(map),
@@ -30,22 +31,27 @@ DecisionPipeline::DecisionPipeline(const PipelineConfig& config, const core::Cos
 }
 
 void DecisionPipeline::charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept {
+  meter_.charge_to(id);
   out.work[index(id)] = work;
-  out.cost[index(id)] = costs_.cost(id, work);
+  out.cost[index(id)] = meter_.settle(id, work);
   out.latency += out.cost[index(id)];
 }
 
-core::VirtualBudget DecisionPipeline::budget_of(core::StageId id, const DecisionOutput& out) const noexcept {
+core::MeteredBudget DecisionPipeline::budget_of(core::StageId id, const DecisionOutput& out) noexcept {
   Nanos rest = out.decision.point.deadline - out.latency;
   for (std::size_t later = index(id) + 1; later < core::kStageCount; ++later)
     rest -= from_seconds(out.decision.predicted_s[later]);
-  return {costs_, id, rest};
+  return {meter_, id, meter_.grant(id, rest)};
+}
+
+core::MeteredBudget DecisionPipeline::table_budget_of(core::StageId id) noexcept {
+  return {meter_, id, meter_.grant(id, core::slot(core::slot_of(id)).budget)};
 }
 
 void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) noexcept {
-  core::UnlimitedBudget unlimited;
+  core::MeteredBudget budget = table_budget_of(core::StageId::kPointCloud);
   core::Work work;
-  (void)cloud_.step(in.frames, 0, unlimited, work);
+  (void)cloud_.step(in.frames, 0, budget, work);
   const double r_m = radius_m();
   const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m),
                         config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
@@ -55,11 +61,15 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   // What the map will hold once this decision's images are in it.
   out.profile.map_volume_m3 = map_.known_volume_m3() + cloud_.seen_volume_m3();
   charge(core::StageId::kPointCloud, work, out);
+}
 
+void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noexcept {
   out.decision = governor_.decide(out.profile, {failures_, (in.goal_W - in.p_WB).norm()});
   if (out.decision.predicted_s[index(core::StageId::kGovernor)] > 0.0)
     charge(core::StageId::kGovernor, {}, out);
+}
 
+void DecisionPipeline::integrate(const DecisionInput& in, DecisionOutput& out) noexcept {
   core::StaticVector<Vector3, kTrajectoryPoints> trajectory_W;
   (void)trajectory_W.push_back(in.p_WB);
   const double begin_s = seconds(in.now - in.committed->start_time);
@@ -68,15 +78,18 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
     if (!trajectory_W.push_back(in.committed->at_s(begin_s + ahead_s).p_W)) break;
   }
   const OperatingPoint& point = out.decision.point;
-  core::VirtualBudget map_budget = budget_of(core::StageId::kMap, out);
+  core::MeteredBudget budget = budget_of(core::StageId::kMap, out);
   stages::IntegrationResult integrated;
   (void)map_.integrate({in.frames, point.p0_level, point.v0_m3, {trajectory_W.begin(), trajectory_W.size()}},
-                       map_budget, integrated);
+                       budget, integrated);
   charge(core::StageId::kMap, integrated.work, out);
+}
 
-  core::VirtualBudget export_budget = budget_of(core::StageId::kExport, out);
+void DecisionPipeline::export_map(const DecisionInput& in, DecisionOutput& out) noexcept {
+  const OperatingPoint& point = out.decision.point;
+  core::MeteredBudget budget = budget_of(core::StageId::kExport, out);
   core::Work exported;
-  (void)map_.export_view({point.p1_level, point.v1_m3, in.p_WB}, export_budget, exported);
+  (void)map_.export_view({point.p1_level, point.v1_m3, in.p_WB}, budget, exported);
   charge(core::StageId::kExport, exported, out);
 }
 
@@ -100,8 +113,8 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   core::Work smoother_work;
   planner_work.level = point.p1_level;
   planner_work.units = check_lookups;
-  core::VirtualBudget planner_budget = budget_of(core::StageId::kPlanner, out);
-  core::UnlimitedBudget smoother_budget;
+  core::MeteredBudget planner_budget = budget_of(core::StageId::kPlanner, out);
+  core::MeteredBudget smoother_budget = table_budget_of(core::StageId::kSmoother);
   for (const double room_m : {kCornerRoom_m, 0.0}) {
     stages::PlanRequest request;
     request.start_W = start.p_W;
@@ -112,6 +125,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
     request.horizon_m = config_.horizon_m;
     request.seed = in.seed;
     stages::PlanResult planned;
+    meter_.charge_to(core::StageId::kPlanner);
     out.planner_status = planner_.plan(request, view, planner_budget, planned);
     out.planned_to_goal = planned.reaches_goal;
     planner_work.units += planned.work.units;
@@ -125,6 +139,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
       smooth.start_time = takes_over;
       smooth.limits = {point.speed_limit_mps, config_.acceleration_mps2};
       smooth.radius_m = out.planner_status == Status::kStartBlocked ? config_.vehicle_radius_m : r_m;
+      meter_.charge_to(core::StageId::kSmoother);
       out.smoother_status = smoother_.smooth(smooth, view, smoother_budget, smoothed);
       smoother_work.units += smoothed.work.units;
     }
@@ -137,7 +152,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
     out.kind = DecisionKind::kNew;
     out.trajectory = smoothed.trajectory;
   } else if (committed_until_s < 1e300) {
-    const MonotonicTime soonest = in.now + out.latency + Nanos{2'500'000};
+    const MonotonicTime soonest = in.now + out.latency + core::kMinorFrame;
     const TrajectoryPoint then = in.committed->at(soonest);
     Trajectory stop;
     if (then.v_W.norm() > 0.05 &&
@@ -153,13 +168,26 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   }
 }
 
-void DecisionPipeline::decide(const DecisionInput& in, DecisionOutput& out) noexcept {
-  out = {};
-  perceive(in, out);
-  plan(in, out);
-  for (std::size_t i = 0; i < core::kStageCount; ++i)
-    governor_.observe(static_cast<core::StageId>(i), out.decision.predicted_s[i], seconds(out.cost[i]));
-  failures_ = out.kind == DecisionKind::kNew ? 0 : failures_ + 1;
+void DecisionPipeline::run(core::StageId id, const DecisionInput& in, DecisionOutput& out) noexcept {
+  switch (id) {
+    case core::StageId::kPointCloud:
+      out = {};
+      return perceive(in, out);
+    case core::StageId::kGovernor:
+      return govern(in, out);
+    case core::StageId::kMap:
+      return integrate(in, out);
+    case core::StageId::kExport:
+      return export_map(in, out);
+    case core::StageId::kPlanner:
+      plan(in, out);
+      for (std::size_t i = 0; i < core::kStageCount; ++i)
+        governor_.observe(static_cast<core::StageId>(i), out.decision.predicted_s[i], seconds(out.cost[i]));
+      failures_ = out.kind == DecisionKind::kNew ? 0 : failures_ + 1;
+      return;
+    case core::StageId::kSmoother:
+      return;
+  }
 }
 
 }  // namespace roborun::app

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <span>
 
-#include "core/executive/cost_profile.hpp"
 #include "core/executive/stage_budget.hpp"
+#include "core/executive/stage_meter.hpp"
 #include "core/geometry/vector.hpp"
 #include "core/trajectory.hpp"
 #include "governor/policy/governor.hpp"
@@ -58,27 +58,35 @@ struct DecisionOutput {
   Nanos latency{};  ///< Sum of the costs: when the result is there, counted from input.now.
 };
 
-/// Runs the stages in the order of the frame table below, each under the budget that the governor granted it.
+/// Runs the stages in the order of the frame table, each under the budget that the governor granted it.
 /// Memory: everything is taken from the arena at construction. One thread.
 class DecisionPipeline {
  public:
   /// The map and the planner are given from outside, so that any backend flies with any design.
-  DecisionPipeline(const PipelineConfig& config, const core::CostProfile& costs, governor::Governor& governor,
+  DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter, governor::Governor& governor,
                    stages::PointCloud& cloud, stages::OccupancyMap& map, stages::Planner& planner,
                    stages::Smoother& smoother) noexcept;
 
-  void decide(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// One stage of a decision; all of them in order make one. `out` is begun by the first (kPointCloud). The
+  /// smoother alternates with the planner in the planner's turn, each charged for its own, and has no turn.
+  /// RT-safe: no allocation; bounded by the stages' budgets.
+  void run(core::StageId id, const DecisionInput& in, DecisionOutput& out) noexcept;
 
  private:
   void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
   void perceive(const DecisionInput& in, DecisionOutput& out) noexcept;
+  void govern(const DecisionInput& in, DecisionOutput& out) noexcept;
+  void integrate(const DecisionInput& in, DecisionOutput& out) noexcept;
+  void export_map(const DecisionInput& in, DecisionOutput& out) noexcept;
   void plan(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// What is left of the deadline for this stage, when the stages after it get what was predicted for them.
-  [[nodiscard]] core::VirtualBudget budget_of(core::StageId id, const DecisionOutput& out) const noexcept;
+  [[nodiscard]] core::MeteredBudget budget_of(core::StageId id, const DecisionOutput& out) noexcept;
+  /// For the stages that the governor does not shape: the frame table's.
+  [[nodiscard]] core::MeteredBudget table_budget_of(core::StageId id) noexcept;
   [[nodiscard]] double radius_m() const noexcept { return config_.vehicle_radius_m + config_.inflation_m; }
 
   PipelineConfig config_;
-  const core::CostProfile& costs_;
+  core::StageMeter& meter_;
   governor::Governor& governor_;
   stages::PointCloud& cloud_;
   stages::OccupancyMap& map_;

@@ -10,7 +10,7 @@ constexpr Nanos kHover{300'000'000};     // at the top, before the first decisio
 
 }  // namespace
 
-void FlightLane::read(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_if::Barometer& barometer) {
+void FlightLane::sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_if::Barometer& barometer) {
   // At most a ring's worth a frame, so that a flood of samples cannot hold the lane.
   constexpr int kMost = 16;
   firmware_if::ImuSample sample;
@@ -22,18 +22,18 @@ void FlightLane::read(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_i
     (void)estimator_.update(pressure);
 }
 
-void FlightLane::fly(MonotonicTime now, firmware_if::Motors& motors) {
-  stages::Tracker::Input in;
-  if (estimator_.state(in.state) != Status::kOk) return;
+void FlightLane::commit(MonotonicTime now) {
+  stages::EstimatedState state;
+  if (estimator_.state(state) != Status::kOk) return;
   if (!first_estimate_) {
     first_estimate_ = now;
-    const Matrix3 R_WB = in.state.q_WB.toRotationMatrix();
+    const Matrix3 R_WB = state.q_WB.toRotationMatrix();
     yaw_rad_ = core::atan2(R_WB(1, 0), R_WB(0, 0));
   }
-  if (!taking_off_) {
+  if (!flying_) {
     if (now - *first_estimate_ < kSettle) return;
-    committed_ = take_off_(in.state.p_WB, now);
-    taking_off_ = true;
+    committed_ = take_off_(state.p_WB, now);
+    flying_ = true;
   }
   if (!airborne_ && now > committed_.start_time + from_seconds(committed_.duration_s()) + kHover)
     airborne_ = true;
@@ -41,6 +41,11 @@ void FlightLane::fly(MonotonicTime now, firmware_if::Motors& motors) {
     committed_ = *offered_;
     offered_.reset();
   }
+}
+
+void FlightLane::track(MonotonicTime now, firmware_if::Motors& motors) {
+  stages::Tracker::Input in;
+  if (!flying_ || estimator_.state(in.state) != Status::kOk) return;
   in.reference = committed_.at(now);
   in.yaw_rad = yaw_rad_;
   // A refused step leaves the command of the frame before.

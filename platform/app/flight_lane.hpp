@@ -25,13 +25,19 @@ class FlightLane {
   void set_take_off(TakeOff take_off) { take_off_ = std::move(take_off); }
   /// A trajectory that takes over at its start time. The last one offered counts.
   void offer(const Trajectory& trajectory) { offered_ = trajectory; }
-  /// One minor frame: read all sensors, estimate, switch to an offered trajectory that is due, track,
-  /// command.
+  /// The three steps of a minor frame, in this order. RT-safe: O(1), no allocation (but the take-off's own).
+  /// Reads all sensors, at most a ring's worth each, and estimates.
+  void sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_if::Barometer& barometer);
+  /// Switches to an offered trajectory that is due.
+  void commit(MonotonicTime now);
+  /// Tracks the committed trajectory and commands the motors; nothing before the take-off.
+  void track(MonotonicTime now, firmware_if::Motors& motors);
+  /// All three at once, where nobody asks what each of them takes.
   template <typename Sensors>
   void step(MonotonicTime now, Sensors& sensors, firmware_if::Motors& motors) {
-    read(static_cast<firmware_if::Imu&>(sensors), static_cast<firmware_if::Gnss&>(sensors),
-         static_cast<firmware_if::Barometer&>(sensors));
-    fly(now, motors);
+    sense(sensors, sensors, sensors);
+    commit(now);
+    track(now, motors);
   }
 
   [[nodiscard]] const Trajectory& committed() const { return committed_; }
@@ -41,9 +47,6 @@ class FlightLane {
   [[nodiscard]] bool airborne() const { return airborne_; }
 
  private:
-  void read(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_if::Barometer& barometer);
-  void fly(MonotonicTime now, firmware_if::Motors& motors);
-
   stages::Estimator estimator_;
   stages::Tracker tracker_;
   TakeOff take_off_;
@@ -51,7 +54,7 @@ class FlightLane {
   std::optional<Trajectory> offered_;
   firmware_if::MotorCommand command_{};
   std::optional<MonotonicTime> first_estimate_;
-  bool taking_off_{false};
+  bool flying_{false};  ///< There is a trajectory to track.
   bool airborne_{false};
   double yaw_rad_{0.0};
 };

@@ -8,9 +8,14 @@
 #include <functional>
 #include <string>
 
+#include "platform/app/audit_command.hpp"
 #include "platform/app/calibrate_command.hpp"
+#include "platform/app/can_command.hpp"
 #include "platform/app/explain_command.hpp"
 #include "platform/app/fly_command.hpp"
+#include "platform/app/gpio_command.hpp"
+#include "platform/app/map_command.hpp"
+#include "platform/app/memory_command.hpp"
 #include "platform/app/solve_command.hpp"
 #include "platform/sitl/world/input_error.hpp"
 
@@ -35,6 +40,11 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   roborun::app::add_calibrate_command(app, run);
   roborun::app::add_explain_command(app, run);
   roborun::app::add_solve_command(app, run);
+  roborun::app::add_audit_command(app, run);
+  roborun::app::add_memory_command(app, run);
+  roborun::app::add_map_command(app, run);
+  roborun::app::add_can_command(app, run);
+  roborun::app::add_gpio_command(app, run);
   try {
     app.parse(argc, argv);
     return run ? run() : 2;

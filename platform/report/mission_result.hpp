@@ -83,10 +83,18 @@ struct PathPoint {
   double speed_mps{};
 };
 
+/// One pool of the memory plan, and how much of it was ever in use.
+struct PoolUse {
+  std::string name;
+  std::size_t element_bytes{}, count{}, high_water{};
+  bool tells_use{};  ///< Its owner says how much is in use.
+};
+
 struct MissionReport {
   MissionResult result;
   std::vector<DecisionRecord> decisions;
   std::vector<PathPoint> path;  ///< At 10 Hz.
+  std::vector<PoolUse> pools;
 };
 
 /// One line. Numbers that are not finite become null.

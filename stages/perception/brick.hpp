@@ -46,17 +46,24 @@ struct Brick {
   std::array<std::uint8_t, 512 + 64 + 8 + 1> mip{};  ///< Levels 1 to 4, derived by refresh().
   std::int32_t x{}, y{}, z{};                        ///< Position in bricks from the map's corner.
   std::uint16_t known_count{};                       ///< Cells that are not unknown.
-  bool dirty{};                                      ///< Cells changed since refresh().
+  bool dirty{};                                      ///< Written to in this scan.
+  bool stale{};                                      ///< Cells changed since refresh().
 
-  void clear(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
+  /// All cells become `value`: kUnknown or kFree.
+  void fill(std::int8_t value) noexcept;
   /// Derives mip and known_count from cell. O(4096).
   void refresh() noexcept;
   /// Flags of the cell of `level` (0 .. 4) with this Morton index. After refresh(). O(1).
   [[nodiscard]] std::uint8_t flags(int level, std::uint32_t morton) const noexcept;
-  /// Free evidence for all cells below (level, morton).
-  void add_free(int level, std::uint32_t morton) noexcept;
+  /// Free evidence for the blocks of `level` with Morton index 8 * parent + i, for each bit i of `blocks`.
+  void add_free(int level, std::uint32_t parent, std::uint8_t blocks) noexcept;
   /// A surface in this cell of level 0.
   void add_hit(std::uint32_t morton) noexcept;
+
+ private:
+  [[nodiscard]] std::uint64_t load(std::size_t first) const noexcept;
+  /// Free evidence for those of eight cells whose bytes are set in `selected`.
+  void free_eight(std::size_t first, std::uint64_t selected) noexcept;
 };
 
 /// Index of an entry in Brick::mip; level 1 .. 4.
@@ -65,12 +72,15 @@ struct Brick {
   return kStart[static_cast<std::size_t>(level)] + morton;
 }
 
+inline constexpr std::array<std::uint16_t, 16> kMortonSpread{0x000, 0x001, 0x008, 0x009, 0x040, 0x041,
+                                                             0x048, 0x049, 0x200, 0x201, 0x208, 0x209,
+                                                             0x240, 0x241, 0x248, 0x249};
+
 /// Interleaves the low four bits of x, y, z: x lowest.
 [[nodiscard]] constexpr std::uint32_t morton3(std::uint32_t x, std::uint32_t y, std::uint32_t z) noexcept {
-  constexpr std::array<std::uint16_t, 16> kSpread{0x000, 0x001, 0x008, 0x009, 0x040, 0x041, 0x048, 0x049,
-                                                  0x200, 0x201, 0x208, 0x209, 0x240, 0x241, 0x248, 0x249};
-  return static_cast<std::uint32_t>(kSpread[x & 15U]) | (static_cast<std::uint32_t>(kSpread[y & 15U]) << 1U) |
-         (static_cast<std::uint32_t>(kSpread[z & 15U]) << 2U);
+  return static_cast<std::uint32_t>(kMortonSpread[x & 15U]) |
+         (static_cast<std::uint32_t>(kMortonSpread[y & 15U]) << 1U) |
+         (static_cast<std::uint32_t>(kMortonSpread[z & 15U]) << 2U);
 }
 
 }  // namespace roborun::stages

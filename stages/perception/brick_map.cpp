@@ -27,10 +27,6 @@ std::size_t position_count(const Aabb& bounds_W) noexcept {
          static_cast<std::size_t>(even_bricks(size.z()));
 }
 
-std::size_t pyramid_bytes(std::size_t side) noexcept {
-  return sizeof(DepthPyramid::Bound) * (side * side * 2 + 64);
-}
-
 }  // namespace
 
 Status BrickMap::Config::validate() const noexcept {
@@ -49,9 +45,10 @@ Status BrickMap::Config::validate() const noexcept {
 
 std::size_t BrickMap::arena_bytes(const Config& config) noexcept {
   const std::size_t positions = position_count(config.bounds_W);
-  return positions * (sizeof(std::int32_t) + sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
+  return positions * sizeof(std::int32_t) + positions / 8 * (sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
          config.max_bricks * (sizeof(Brick) + 2 * sizeof(std::uint32_t)) +
-         config.max_frames * pyramid_bytes(config.max_image_side) + 16 * alignof(std::max_align_t);
+         config.max_frames * DepthPyramid::arena_bytes(config.max_image_side) +
+         16 * alignof(std::max_align_t);
 }
 
 BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
@@ -61,13 +58,24 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
       ny_(even_bricks(config.bounds_W.max_W.y() - corner_W_.y())),
       nz_(even_bricks(config.bounds_W.max_W.z() - corner_W_.z())) {
   const std::size_t positions = position_count(config.bounds_W);
-  slot_ = arena.take<std::int32_t>(positions);
-  order_ = arena.take<std::uint32_t>(positions);
-  order_key_ = arena.take<std::uint16_t>(positions);
-  brick_ = arena.take<Brick>(config.max_bricks);
-  free_list_ = arena.take<std::uint32_t>(config.max_bricks);
-  dirty_ = arena.take<std::uint32_t>(config.max_bricks);
-  std::fill(slot_.begin(), slot_.end(), -1);
+  slot_ = arena.take<std::int32_t>(positions, "map positions");
+  order_ = arena.take<std::uint32_t>(positions / 8, "map order");
+  order_key_ = arena.take<std::uint16_t>(positions / 8, "map order keys");
+  brick_ = arena.take<Brick>(config.max_bricks, "map bricks");
+  brick_pool_ = &arena.last_pool();
+  free_list_ = arena.take<std::uint32_t>(config.max_bricks, "map free list");
+  dirty_ = arena.take<std::uint32_t>(config.max_bricks, "map dirty list");
+  std::fill(slot_.begin(), slot_.end(), kUnknownBrick);
+  free_brick_.fill(evidence::kFree);
+  const auto cell_at = [this](const Vector3& p_W) {
+    const Vector3 local = (p_W - corner_W_) / kFinestCell_m;
+    return Cell{static_cast<std::int32_t>(local.x()), static_cast<std::int32_t>(local.y()),
+                static_cast<std::int32_t>(local.z())};
+  };
+  low_ = cell_at(config.bounds_W.min_W);
+  high_ = cell_at(config.bounds_W.max_W);
+  high_ = {std::min(high_.x, nx_ * kBrickCells - 1), std::min(high_.y, ny_ * kBrickCells - 1),
+           std::min(high_.z, nz_ * kBrickCells - 1)};
   // Highest slot first, so that slots are handed out from 0 up.
   for (std::size_t i = 0; i < free_list_.size(); ++i) {
     free_list_[i] = static_cast<std::uint32_t>(free_list_.size() - 1 - i);
@@ -97,12 +105,22 @@ bool BrickMap::cell_of(const Vector3& p_W, Cell& cell) const noexcept {
 Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept {
   std::int32_t& slot = slot_[slot_of(bx, by, bz)];
   if (slot < 0) {
-    if (free_count_ == 0 && !give_up_farthest()) {
+    const bool was_free = slot == kFreeBrick;
+    if (brick_pool_->exhausted() || (free_count_ == 0 && !give_up_farthest())) {
+      // What cannot be kept any more is unknown: never free by want of memory.
+      if (was_free) known_cells_ -= kCellsPerBrick;
+      slot = kUnknownBrick;
       ++counters_.bricks_refused;
       return nullptr;
     }
     slot = static_cast<std::int32_t>(free_list_[--free_count_]);
-    brick_[static_cast<std::size_t>(slot)].clear(bx, by, bz);
+    brick_pool_->use(brick_.size() - free_count_);
+    Brick& fresh = brick_[static_cast<std::size_t>(slot)];
+    fresh.fill(was_free ? evidence::kFree : evidence::kUnknown);
+    fresh.x = bx;
+    fresh.y = by;
+    fresh.z = bz;
+    fresh.dirty = false;
   }
   Brick& brick = brick_[static_cast<std::size_t>(slot)];
   if (!brick.dirty && dirty_count_ < dirty_.size()) {
@@ -110,6 +128,17 @@ Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexce
     brick.dirty = true;
   }
   return &brick;
+}
+
+void BrickMap::free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept {
+  std::int32_t& slot = slot_[slot_of(bx, by, bz)];
+  if (slot == kFreeBrick) return;
+  if (slot == kUnknownBrick) {
+    slot = kFreeBrick;
+    known_cells_ += kCellsPerBrick;
+    return;
+  }
+  if (Brick* brick = touch(bx, by, bz)) brick->add_free(kBrickLevel, 0, 1U);
 }
 
 bool BrickMap::give_up_farthest() noexcept {
@@ -122,15 +151,21 @@ bool BrickMap::give_up_farthest() noexcept {
     const double distance_m = (brick_center_W(b.x, b.y, b.z) - vehicle_W_).norm();
     return std::min(static_cast<std::size_t>(distance_m / kBucket_m), kBuckets - 1);
   };
-  for (const Brick& b : brick_) ++histogram[bucket(b)];
+  const auto in_use = [this](std::size_t i) {
+    const Brick& b = brick_[i];
+    return slot_[slot_of(b.x, b.y, b.z)] == static_cast<std::int32_t>(i);
+  };
+  for (std::size_t i = 0; i < brick_.size(); ++i) {
+    if (in_use(i)) ++histogram[bucket(brick_[i])];
+  }
   std::size_t threshold = kBuckets - 1;
   std::size_t count = histogram[threshold];
   while (threshold > 1 && count < brick_.size() / 16) count += histogram[--threshold];
   std::size_t given_up = 0;
   for (std::size_t i = 0; i < brick_.size(); ++i) {
     Brick& b = brick_[i];
-    if (b.dirty || bucket(b) < threshold) continue;
-    slot_[slot_of(b.x, b.y, b.z)] = -1;
+    if (!in_use(i) || b.dirty || bucket(b) < threshold) continue;
+    slot_[slot_of(b.x, b.y, b.z)] = kUnknownBrick;
     known_cells_ -= b.known_count;
     b.known_count = 0;
     free_list_[free_count_++] = static_cast<std::uint32_t>(i);
@@ -140,12 +175,21 @@ bool BrickMap::give_up_farthest() noexcept {
   return given_up > 0;
 }
 
+void BrickMap::refresh(Brick& brick) noexcept {
+  if (!brick.stale) return;
+  known_cells_ -= brick.known_count;
+  brick.refresh();
+  known_cells_ += brick.known_count;
+}
+
 void BrickMap::refresh_dirty() noexcept {
   for (std::size_t i = 0; i < dirty_count_; ++i) {
     Brick& b = brick_[dirty_[i]];
-    known_cells_ -= b.known_count;
-    b.refresh();
-    known_cells_ += b.known_count;
+    refresh(b);
+    b.dirty = false;
+    if (b.flags(kBrickLevel, 0) != content::kFree) continue;
+    slot_[slot_of(b.x, b.y, b.z)] = kFreeBrick;
+    free_list_[free_count_++] = dirty_[i];
   }
   dirty_count_ = 0;
 }
@@ -156,12 +200,19 @@ double BrickMap::known_volume_m3() const noexcept {
 
 std::size_t BrickMap::bytes() const noexcept { return arena_bytes(config_); }
 
+std::size_t BrickMap::used_bytes() const noexcept {
+  std::size_t known_positions = 0;
+  for (const std::int32_t slot : slot_) known_positions += slot != kUnknownBrick ? 1U : 0U;
+  return (brick_.size() - free_count_) * sizeof(Brick) + known_positions * sizeof(std::int32_t);
+}
+
 std::uint64_t BrickMap::digest() const noexcept {
   core::StateHash hash;
   for (std::size_t position = 0; position < slot_.size(); ++position) {
-    if (slot_[position] < 0) continue;
+    if (slot_[position] == kUnknownBrick) continue;
     hash.add(static_cast<std::uint64_t>(position));
-    const Brick& b = brick_[static_cast<std::size_t>(slot_[position])];
+    const Brick& b =
+        slot_[position] == kFreeBrick ? free_brick_ : brick_[static_cast<std::size_t>(slot_[position])];
     for (std::size_t i = 0; i < kCellsPerBrick; i += 8) {
       std::uint64_t word = 0;
       for (std::size_t k = 0; k < 8; ++k) word = (word << 8U) | static_cast<std::uint8_t>(b.cell[i + k]);

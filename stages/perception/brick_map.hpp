@@ -1,4 +1,5 @@
-/// The occupancy map of the project: bricks on the precision lattice, in fixed memory.
+/// The occupancy map of the project: bricks on the precision lattice, in fixed memory. A brick that is free
+/// all over needs no memory but its place in the table of positions.
 ///
 /// Free space is found projectively, coarse to fine: a block all of whose pixels see past it is free at once,
 /// a block behind the surface is left alone, the rest is divided until cells of p0. Surfaces are the pixels'
@@ -14,6 +15,7 @@
 #include <span>
 
 #include "core/memory/arena.hpp"
+#include "stages/perception/block_sight.hpp"
 #include "stages/perception/brick.hpp"
 #include "stages/perception/depth_pyramid.hpp"
 #include "stages/perception/occupancy_map.hpp"
@@ -56,22 +58,16 @@ class BrickMap final : public OccupancyMap, private MapView {
   [[nodiscard]] std::size_t bytes() const noexcept override;
   [[nodiscard]] std::uint64_t digest() const noexcept override;
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+  /// Of bytes(): what the known space of now needs, its share of the table of positions included.
+  [[nodiscard]] std::size_t used_bytes() const noexcept;
+  [[nodiscard]] std::uint64_t known_cells() const noexcept { return known_cells_; }
 
  private:
   struct Cell {
     std::int32_t x, y, z;
   };
-  struct Camera {
-    Matrix3 R_CW;
-    Matrix3 abs_R_CW;
-    Vector3 p_WC;
-    double pixels_per_tan;  ///< Horizontal.
-    double rows_per_tan;
-    double tan_half;
-    int width, height;
-    float range_m;
-  };
-  enum class Sight : std::uint8_t { kFree, kHidden, kMixed };
+  static constexpr std::int32_t kUnknownBrick = -1;
+  static constexpr std::int32_t kFreeBrick = -2;
   struct Node {
     int level;
     std::uint32_t x, y, z;  ///< In cells of `level` from the brick's corner.
@@ -84,12 +80,21 @@ class BrickMap final : public OccupancyMap, private MapView {
 
   [[nodiscard]] std::size_t usable_frames(const IntegrationRequest& request,
                                           IntegrationResult& result) noexcept;
-  [[nodiscard]] std::size_t order_bricks(const IntegrationRequest& request) noexcept;
-  [[nodiscard]] bool clear_brick(std::uint32_t slot, const IntegrationRequest& request,
-                                 core::StageBudget& budget, core::Work& work) noexcept;
-  [[nodiscard]] Sight sight(const Vector3& center_W, double half_m) const noexcept;
-  [[nodiscard]] Sight sight(std::size_t camera, const Vector3& center_W, double half_m,
-                            bool& inside) const noexcept;
+  /// A block of 2^3 bricks: one cell of the coarsest level, and the unit in which v0 is spent.
+  struct Block {
+    std::int32_t x, y, z;
+  };
+  [[nodiscard]] std::size_t order_blocks(const IntegrationRequest& request) noexcept;
+  [[nodiscard]] std::size_t block_index(const Block& block) const noexcept;
+  [[nodiscard]] Block block_at(std::uint32_t index) const noexcept;
+  [[nodiscard]] Vector3 block_center_W(const Block& block) const noexcept;
+  /// Writes free space, block after block, until budget or v0 is spent. Returns the blocks that were done.
+  [[nodiscard]] std::size_t clear_blocks(std::size_t count, const IntegrationRequest& request,
+                                         core::StageBudget& budget, core::Work& work) noexcept;
+  /// False when the budget was spent on the way.
+  [[nodiscard]] bool clear_bricks(const Block& block, std::uint8_t cameras, int finest,
+                                  core::StageBudget& budget, core::Work& work) noexcept;
+  void free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
   void add_surfaces(const IntegrationRequest& request, double reach_m, core::Work& work) noexcept;
   void free_vehicle() noexcept;
   [[nodiscard]] bool cell_of(const Vector3& p_W, Cell& cell) const noexcept;
@@ -100,24 +105,28 @@ class BrickMap final : public OccupancyMap, private MapView {
   [[nodiscard]] bool brick_range_free(const Brick& brick, const Cell& low, const Cell& high,
                                       std::uint64_t& lookups) const noexcept;
   [[nodiscard]] Vector3 brick_center_W(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
+  void refresh(Brick& brick) noexcept;
   void refresh_dirty() noexcept;
 
   Config config_;
   Vector3 corner_W_;              ///< Of the map, a multiple of the coarsest cell.
   std::int32_t nx_, ny_, nz_;     ///< Bricks, even numbers.
-  std::span<std::int32_t> slot_;  ///< Brick of each position, or -1.
+  Cell low_, high_;               ///< Cells of the bounds.
+  std::span<std::int32_t> slot_;  ///< Brick of each position, or kUnknownBrick, or kFreeBrick.
   std::span<Brick> brick_;
+  core::PoolRecord* brick_pool_{nullptr};
   std::span<std::uint32_t> free_list_;
   std::span<std::uint32_t> dirty_;
-  std::span<std::uint32_t> order_;  ///< Positions near the cameras, nearest to the trajectory first.
-  std::span<std::uint16_t> order_key_;
+  std::span<std::uint32_t> order_;      ///< Blocks near the cameras, nearest to the trajectory first.
+  std::span<std::uint16_t> order_key_;  ///< Of each block of the map.
   std::size_t free_count_{0};
   std::size_t dirty_count_{0};
-  std::array<Camera, 8> camera_{};
-  std::array<std::size_t, 8> frame_of_{};
-  std::size_t camera_count_{0};
-  bool complete_{false};  ///< Every camera of the vehicle contributed to this scan.
-  std::array<std::optional<DepthPyramid>, 8> pyramid_{};
+  SightCameras cameras_{};
+  BrickSeen seen_{};
+  SurfaceRow row_{};
+  Brick free_brick_{};  ///< What every position with kFreeBrick reads as.
+  std::array<std::size_t, kMaxCameras> frame_of_{};
+  std::array<std::optional<DepthPyramid>, kMaxCameras> pyramid_{};
   std::uint64_t known_cells_{0};
   Vector3 vehicle_W_ = Vector3::Zero();
   int view_level_{0};

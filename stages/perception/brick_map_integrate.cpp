@@ -6,64 +6,79 @@
 namespace roborun::stages {
 namespace {
 
-constexpr double kNear_m = 1e-3;  // a box that reaches behind the camera is projected from here on
-constexpr std::uint64_t kPollEvery = 512;
-constexpr double kOrderStep_m = 0.5;  // bricks whose distances differ by less keep their order in space
+constexpr double kOrderStep_m = 0.5;  // blocks whose distances differ by less keep their order in space
+constexpr int kBlockLevel = kBrickLevel + 1;
+constexpr double kBlock_m = cell_size_m(kBlockLevel);
 
-double node_volume_m3(int level) noexcept {
+constexpr double volume_m3(int level) noexcept {
   const double edge_m = cell_size_m(level);
   return edge_m * edge_m * edge_m;
+}
+
+std::uint32_t in_brick(std::int32_t cell) noexcept {
+  return static_cast<std::uint32_t>(cell & (kBrickCells - 1));
 }
 
 }  // namespace
 
 std::size_t BrickMap::usable_frames(const IntegrationRequest& request, IntegrationResult& result) noexcept {
-  camera_count_ = 0;
+  cameras_.count = 0;
   for (std::size_t i = 0; i < request.frames.size(); ++i) {
     const PosedDepthFrame& posed = request.frames[i];
-    if (camera_count_ == config_.max_frames || check_frame(posed) != Status::kOk ||
-        pyramid_[camera_count_]->build(posed.frame) != Status::kOk) {
+    if (cameras_.count == config_.max_frames || check_frame(posed) != Status::kOk ||
+        pyramid_[cameras_.count]->build(posed.frame) != Status::kOk) {
       ++result.frames_refused;
       continue;
     }
-    Camera& c = camera_[camera_count_];
-    c.R_CW = posed.X_WC.R_RT.transpose();
-    c.abs_R_CW = c.R_CW.cwiseAbs();
-    c.p_WC = posed.X_WC.p_RT;
-    c.tan_half = static_cast<double>(posed.frame.tan_half_fov_ratio);
-    c.width = posed.frame.width;
-    c.height = posed.frame.height;
-    c.pixels_per_tan = 0.5 * c.width / c.tan_half;
-    c.rows_per_tan = 0.5 * c.height / c.tan_half;
-    c.range_m = posed.frame.range_m;
-    frame_of_[camera_count_] = i;
-    ++camera_count_;
+    cameras_.camera[cameras_.count].prepare(posed, *pyramid_[cameras_.count],
+                                            {config_.depth_margin_m, config_.depth_margin_per_m});
+    frame_of_[cameras_.count++] = i;
   }
   counters_.frames_refused += result.frames_refused;
-  complete_ = camera_count_ == config_.max_frames;
-  return camera_count_;
+  cameras_.complete = cameras_.count == config_.max_frames;
+  return cameras_.count;
 }
 
-std::size_t BrickMap::order_bricks(const IntegrationRequest& request) noexcept {
-  // Everything that a camera can see, as a box around all of them; a cubic frustum of range r reaches sqrt(3)
-  // r.
-  Vector3 low = camera_[0].p_WC;
+std::size_t BrickMap::block_index(const Block& block) const noexcept {
+  return (static_cast<std::size_t>(block.z) * static_cast<std::size_t>(ny_ / 2) +
+          static_cast<std::size_t>(block.y)) *
+             static_cast<std::size_t>(nx_ / 2) +
+         static_cast<std::size_t>(block.x);
+}
+
+BrickMap::Block BrickMap::block_at(std::uint32_t index) const noexcept {
+  const auto nx = static_cast<std::uint32_t>(nx_ / 2);
+  const auto ny = static_cast<std::uint32_t>(ny_ / 2);
+  return {static_cast<std::int32_t>(index % nx), static_cast<std::int32_t>((index / nx) % ny),
+          static_cast<std::int32_t>(index / nx / ny)};
+}
+
+Vector3 BrickMap::block_center_W(const Block& block) const noexcept {
+  return corner_W_ + kBlock_m * Vector3(block.x + 0.5, block.y + 0.5, block.z + 0.5);
+}
+
+std::size_t BrickMap::order_blocks(const IntegrationRequest& request) noexcept {
+  // Everything that a camera can see, as a box around all of them; a cubic frustum of range r reaches
+  // sqrt(3) r.
+  Vector3 low = cameras_.camera[0].p_WC;
   Vector3 high = low;
-  for (std::size_t i = 0; i < camera_count_; ++i) {
-    const double reach_m = static_cast<double>(camera_[i].range_m) *
-                           std::sqrt(1.0 + 2.0 * camera_[i].tan_half * camera_[i].tan_half);
-    low = low.cwiseMin(camera_[i].p_WC - Vector3::Constant(reach_m));
-    high = high.cwiseMax(camera_[i].p_WC + Vector3::Constant(reach_m));
+  for (std::size_t i = 0; i < cameras_.count; ++i) {
+    const SightCamera& c = cameras_.camera[i];
+    const double t = static_cast<double>(c.tan_half);
+    const double reach_m = static_cast<double>(c.range_m) * std::sqrt(1.0 + 2.0 * t * t);
+    low = low.cwiseMin(c.p_WC - Vector3::Constant(reach_m));
+    high = high.cwiseMax(c.p_WC + Vector3::Constant(reach_m));
   }
   const Aabb& bounds = config_.bounds_W;
   low = low.cwiseMax(bounds.min_W).cwiseMin(bounds.max_W);
   high = high.cwiseMin(bounds.max_W).cwiseMax(bounds.min_W);
-  const auto index = [](double p_m, double corner_m, std::int32_t count) {
-    return std::clamp(static_cast<std::int32_t>(std::floor((p_m - corner_m) / kBrick_m)), 0, count - 1);
+  const auto index = [](double p_m, double corner_m, std::int32_t bricks) {
+    return std::clamp(static_cast<std::int32_t>((p_m - corner_m) / kBlock_m), 0, bricks / 2 - 1);
   };
-  const std::int32_t x0 = index(low.x(), corner_W_.x(), nx_), x1 = index(high.x(), corner_W_.x(), nx_);
-  const std::int32_t y0 = index(low.y(), corner_W_.y(), ny_), y1 = index(high.y(), corner_W_.y(), ny_);
-  const std::int32_t z0 = index(low.z(), corner_W_.z(), nz_), z1 = index(high.z(), corner_W_.z(), nz_);
+  const Block first{index(low.x(), corner_W_.x(), nx_), index(low.y(), corner_W_.y(), ny_),
+                    index(low.z(), corner_W_.z(), nz_)};
+  const Block last{index(high.x(), corner_W_.x(), nx_), index(high.y(), corner_W_.y(), ny_),
+                   index(high.z(), corner_W_.z(), nz_)};
 
   // Counting sort by distance to the trajectory: bounded, stable, no comparison of doubles.
   constexpr std::size_t kBuckets = 256;
@@ -75,152 +90,122 @@ std::size_t BrickMap::order_bricks(const IntegrationRequest& request) noexcept {
     return static_cast<std::uint16_t>(
         std::min(std::sqrt(nearest2) / kOrderStep_m, static_cast<double>(kBuckets - 1)));
   };
-  for (std::int32_t z = z0; z <= z1; ++z) {
-    for (std::int32_t y = y0; y <= y1; ++y) {
-      for (std::int32_t x = x0; x <= x1; ++x) {
-        const std::uint16_t key = key_of(brick_center_W(x, y, z));
-        order_key_[slot_of(x, y, z)] = key;
-        ++start[key];
-      }
-    }
-  }
+  const auto for_each_block = [&first, &last](auto&& on_block) {
+    for (std::int32_t z = first.z; z <= last.z; ++z)
+      for (std::int32_t y = first.y; y <= last.y; ++y)
+        for (std::int32_t x = first.x; x <= last.x; ++x) on_block(Block{x, y, z});
+  };
+  for_each_block([&](const Block& block) {
+    const std::uint16_t key = key_of(block_center_W(block));
+    order_key_[block_index(block)] = key;
+    ++start[key];
+  });
   std::uint32_t total = 0;
   for (std::uint32_t& s : start) {
     const std::uint32_t count = s;
     s = total;
     total += count;
   }
-  for (std::int32_t z = z0; z <= z1; ++z) {
-    for (std::int32_t y = y0; y <= y1; ++y) {
-      for (std::int32_t x = x0; x <= x1; ++x) {
-        const std::size_t position = slot_of(x, y, z);
-        order_[start[order_key_[position]]++] = static_cast<std::uint32_t>(position);
-      }
-    }
-  }
+  for_each_block([&](const Block& block) {
+    const std::size_t at = block_index(block);
+    order_[start[order_key_[at]]++] = static_cast<std::uint32_t>(at);
+  });
   return total;
 }
 
-BrickMap::Sight BrickMap::sight(std::size_t camera, const Vector3& center_W, double half_m,
-                                bool& inside) const noexcept {
-  const Camera& c = camera_[camera];
-  const Vector3 p_C = c.R_CW * (center_W - c.p_WC);
-  const Vector3 e_C = half_m * c.abs_R_CW.rowwise().sum();
-  const double far_m = p_C.x() + e_C.x();
-  const double near_m = p_C.x() - e_C.x();
-  inside = false;
-  if (far_m <= kNear_m) return Sight::kHidden;  // behind the camera
-  const double y_low = p_C.y() - e_C.y(), y_high = p_C.y() + e_C.y();
-  const double z_low = p_C.z() - e_C.z(), z_high = p_C.z() + e_C.z();
-  // The tangents of the four sides; u grows to the right (-y), v downwards (-z).
-  const double inverse_near = 1.0 / std::max(near_m, kNear_m);
-  const double inverse_far = 1.0 / far_m;
-  const double left = y_high * (y_high > 0.0 ? inverse_near : inverse_far);
-  const double right = y_low * (y_low > 0.0 ? inverse_far : inverse_near);
-  const double up = z_high * (z_high > 0.0 ? inverse_near : inverse_far);
-  const double down = z_low * (z_low > 0.0 ? inverse_far : inverse_near);
-  if (right >= c.tan_half || left <= -c.tan_half || down >= c.tan_half || up <= -c.tan_half)
-    return Sight::kHidden;
-  inside = left <= c.tan_half && right >= -c.tan_half && up <= c.tan_half && down >= -c.tan_half;
-  const auto pixel = [](double tangents, double scale, int count) {
-    return std::clamp(static_cast<int>(tangents * scale), 0, count - 1);
-  };
-  const int u0 = pixel(std::max(c.tan_half - left, 0.0), c.pixels_per_tan, c.width);
-  const int u1 = pixel(std::max(c.tan_half - right, 0.0), c.pixels_per_tan, c.width);
-  const int v0 = pixel(std::max(c.tan_half - up, 0.0), c.rows_per_tan, c.height);
-  const int v1 = pixel(std::max(c.tan_half - down, 0.0), c.rows_per_tan, c.height);
-  const DepthPyramid::Bound bound = pyramid_[camera]->bound(u0, v0, u1, v1);
-  const double margin_m = config_.depth_margin_m + config_.depth_margin_per_m * far_m * far_m;
-  // What the camera calls empty up to its range is believed up to the range itself: no margin there.
-  const double needed_m = std::min(far_m + margin_m, std::max(far_m, static_cast<double>(c.range_m)));
-  if (static_cast<double>(bound.least_m) >= needed_m) return Sight::kFree;
-  if (static_cast<double>(bound.most_m) < near_m) return Sight::kHidden;
-  return Sight::kMixed;
-}
-
-BrickMap::Sight BrickMap::sight(const Vector3& center_W, double half_m) const noexcept {
-  bool any_free = false;
-  bool any_hidden = false;
-  bool covered = complete_;
-  for (std::size_t i = 0; i < camera_count_; ++i) {
-    bool inside = false;
-    const Sight seen = sight(i, center_W, half_m, inside);
-    if (seen == Sight::kMixed) return Sight::kMixed;
-    if (seen == Sight::kFree) {
-      any_free = true;
-      covered = covered || inside;
-    } else if (inside) {
-      any_hidden = true;
-    }
-  }
-  if (!any_free) return Sight::kHidden;
-  // Seen as free by one camera and as hidden by another that sees all of it: they disagree, look closer.
-  return !any_hidden && covered ? Sight::kFree : Sight::kMixed;
-}
-
-bool BrickMap::clear_brick(std::uint32_t position, const IntegrationRequest& request,
-                           core::StageBudget& budget, core::Work& work) noexcept {
-  const auto nx = static_cast<std::uint32_t>(nx_);
-  const auto ny = static_cast<std::uint32_t>(ny_);
-  const auto bx = static_cast<std::int32_t>(position % nx);
-  const auto by = static_cast<std::int32_t>((position / nx) % ny);
-  const auto bz = static_cast<std::int32_t>(position / nx / ny);
-  const Vector3 base_W = corner_W_ + kBrick_m * Vector3(bx, by, bz);
-  const int finest = std::min(request.level, kBrickLevel);
-  // Depth first: at most seven siblings wait on each of four levels.
-  std::array<Node, 7 * kBrickLevel + 1> stack{};
-  std::size_t depth = 0;
-  stack[depth++] = {kBrickLevel, 0, 0, 0};
-  Brick* brick = nullptr;
-  while (depth > 0) {
-    const Node node = stack[--depth];
-    const double edge_m = cell_size_m(node.level);
-    const Vector3 center_W = base_W + edge_m * Vector3(node.x + 0.5, node.y + 0.5, node.z + 0.5);
-    if (++work.units % kPollEvery == 0 && budget.spent(work)) return false;
-    const Sight seen = sight(center_W, 0.5 * edge_m);
-    if (seen == Sight::kFree) {
-      work.volume_m3 += node_volume_m3(node.level);
-      const std::uint32_t morton = morton3(node.x, node.y, node.z);
-      const std::int32_t slot = slot_[position];
-      const bool nothing_new =
-          slot >= 0 && !brick_[static_cast<std::size_t>(slot)].dirty &&
-          brick_[static_cast<std::size_t>(slot)].flags(node.level, morton) == content::kFree;
-      if (nothing_new) continue;
-      if (brick == nullptr) brick = touch(bx, by, bz);
-      if (brick == nullptr) return true;  // pool full, and nothing farther away to give up
-      brick->add_free(node.level, morton);
-    } else if (seen == Sight::kMixed && node.level > finest) {
-      for (std::uint32_t child = 0; child < 8; ++child) {
-        stack[depth++] = {node.level - 1, 2 * node.x + (child & 1U), 2 * node.y + ((child >> 1U) & 1U),
-                          2 * node.z + (child >> 2U)};
+bool BrickMap::clear_bricks(const Block& block, std::uint8_t cameras, int finest, core::StageBudget& budget,
+                            core::Work& work) noexcept {
+  const EightSeen eight = see_children(cameras_, {block_center_W(block), kBlockLevel, cameras});
+  ++work.units;
+  for (std::int32_t child = 0; child < 8; ++child) {
+    const std::int32_t bx = 2 * block.x + (child & 1), by = 2 * block.y + ((child >> 1) & 1),
+                       bz = 2 * block.z + (child >> 2);
+    if (((eight.free >> child) & 1) != 0) {
+      free_brick(bx, by, bz);
+      work.volume_m3 += volume_m3(kBrickLevel);
+    } else if (((eight.mixed >> child) & 1) != 0 && finest < kBrickLevel) {
+      see_brick(cameras_,
+                {brick_center_W(bx, by, bz), kBrickLevel, eight.cameras[static_cast<std::size_t>(child)]},
+                finest, seen_);
+      work.units += seen_.visited;
+      work.volume_m3 += seen_.free_cells * volume_m3(0);
+      Brick* brick = nullptr;
+      const bool was_free = slot_[slot_of(bx, by, bz)] == kFreeBrick;
+      for (std::size_t i = 0; i < seen_.count && !was_free; ++i) {
+        const FreeGroup& group = seen_.group[i];
+        if (brick == nullptr) brick = touch(bx, by, bz);
+        if (brick == nullptr) break;  // pool full, and nothing farther away to give up
+        brick->add_free(group.level, group.parent, group.free);
       }
+      if (brick != nullptr) refresh(*brick);  // while it is in the cache
+      if (budget.spent(work)) return false;
     }
   }
   return true;
 }
 
+std::size_t BrickMap::clear_blocks(std::size_t count, const IntegrationRequest& request,
+                                   core::StageBudget& budget, core::Work& work) noexcept {
+  std::array<Vector3, 8> center_W;
+  for (std::size_t first = 0; first < count; first += 8) {
+    const std::size_t here = std::min<std::size_t>(8, count - first);
+    for (std::size_t i = 0; i < 8; ++i)
+      center_W[i] = block_center_W(block_at(order_[first + std::min(i, here - 1)]));
+    const EightSeen eight = see_blocks(cameras_, kBlockLevel, center_W);
+    ++work.units;
+    for (std::size_t i = 0; i < here; ++i) {
+      const Block block = block_at(order_[first + i]);
+      if (((eight.free >> i) & 1U) != 0) {
+        for (std::int32_t child = 0; child < 8; ++child)
+          free_brick(2 * block.x + (child & 1), 2 * block.y + ((child >> 1) & 1), 2 * block.z + (child >> 2));
+        work.volume_m3 += volume_m3(kBlockLevel);
+      } else if (((eight.mixed >> i) & 1U) != 0 && request.level < kBlockLevel) {
+        if (!clear_bricks(block, eight.cameras[i], std::max(request.level, 0), budget, work))
+          return first + i;
+      }
+      if (work.volume_m3 >= request.volume_m3) return first + i + 1;
+    }
+    if (budget.spent(work)) return first + here;
+  }
+  return count;
+}
+
 void BrickMap::add_surfaces(const IntegrationRequest& request, double reach_m, core::Work& work) noexcept {
-  for (std::size_t i = 0; i < camera_count_; ++i) {
+  std::size_t last_position = slot_.size();
+  Brick* brick = nullptr;
+  for (std::size_t i = 0; i < cameras_.count; ++i) {
     const PosedDepthFrame& posed = request.frames[frame_of_[i]];
     const firmware_if::DepthFrame& frame = posed.frame;
-    const double t = static_cast<double>(frame.tan_half_fov_ratio);
+    const double pitch = 2.0 * static_cast<double>(frame.tan_half_fov_ratio);
+    const Vector3 origin = (posed.X_WC.p_RT - corner_W_) / kFinestCell_m;
+    PixelLine line;
+    line.low = {low_.x, low_.y, low_.z};
+    line.high = {high_.x, high_.y, high_.z};
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto k = static_cast<std::size_t>(axis);
+      line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
+      line.rest[k] = static_cast<float>(origin[axis] - line.origin[k]);
+      line.step[k] = static_cast<float>(-pitch / frame.width / kFinestCell_m * posed.X_WC.R_RT(axis, 1));
+    }
     for (int v = 0; v < frame.height; ++v) {
-      const double z = t - (v + 0.5) * 2.0 * t / frame.height;
-      for (int u = 0; u < frame.width; ++u) {
-        const float depth_m =
-            frame.depth_m[static_cast<std::size_t>(v) * frame.width + static_cast<std::size_t>(u)];
-        if (!(depth_m > 0.0F) || depth_m >= frame.range_m) continue;
-        const double y = t - (u + 0.5) * 2.0 * t / frame.width;
-        const Vector3 p_W = posed.X_WC * (static_cast<double>(depth_m) * Vector3(1.0, y, z));
-        Cell cell{};
-        if (!cell_of(p_W, cell)) continue;
+      const Vector3 ray_C(1.0, pitch * (0.5 - 0.5 / frame.width), pitch * (0.5 - (v + 0.5) / frame.height));
+      const Vector3 first = posed.X_WC.R_RT * ray_C / kFinestCell_m;
+      for (int axis = 0; axis < 3; ++axis)
+        line.first[static_cast<std::size_t>(axis)] = static_cast<float>(first[axis]);
+      const std::size_t width = frame.width;
+      end_cells(line, frame.depth_m.subspan(static_cast<std::size_t>(v) * width, width), frame.range_m, row_);
+      for (std::size_t n = 0; n < row_.count; ++n) {
+        const Cell cell{row_.cell[0][n], row_.cell[1][n], row_.cell[2][n]};
         const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
-        // Beyond the space that v0 paid for nothing is written: neither free nor occupied.
-        if (order_key_[slot_of(bx, by, bz)] * kOrderStep_m > reach_m) continue;
-        Brick* brick = touch(bx, by, bz);
+        const std::size_t position = slot_of(bx, by, bz);
+        if (position != last_position) {
+          last_position = position;
+          // Beyond the space that v0 paid for nothing is written: neither free nor occupied.
+          const bool paid = order_key_[block_index({bx / 2, by / 2, bz / 2})] * kOrderStep_m <= reach_m;
+          brick = paid ? touch(bx, by, bz) : nullptr;
+        }
         if (brick == nullptr) continue;
-        const auto inside = [](std::int32_t c) { return static_cast<std::uint32_t>(c & (kBrickCells - 1)); };
-        brick->add_hit(morton3(inside(cell.x), inside(cell.y), inside(cell.z)));
+        brick->add_hit(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)));
         ++work.units;
       }
     }
@@ -236,10 +221,12 @@ void BrickMap::free_vehicle() noexcept {
         const Vector3 offset = kFinestCell_m * Vector3(dx, dy, dz);
         Cell cell{};
         if (offset.norm() > r_m || !cell_of(vehicle_W_ + offset, cell)) continue;
-        Brick* brick = touch(cell.x >> kBrickLevel, cell.y >> kBrickLevel, cell.z >> kBrickLevel);
+        const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
+        if (slot_[slot_of(bx, by, bz)] == kFreeBrick) continue;
+        Brick* brick = touch(bx, by, bz);
         if (brick == nullptr) continue;
-        const auto low = [](std::int32_t c) { return static_cast<std::uint32_t>(c & (kBrickCells - 1)); };
-        brick->add_free(0, morton3(low(cell.x), low(cell.y), low(cell.z)));
+        const std::uint32_t morton = morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z));
+        brick->add_free(0, morton / 8, static_cast<std::uint8_t>(1U << (morton % 8)));
       }
     }
   }
@@ -251,24 +238,15 @@ Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget&
   result.work.level = std::clamp(request.level, 0, kPrecisionLevels - 1);
   if (usable_frames(request, result) == 0 || request.trajectory_W.empty()) return Status::kInvalidArgument;
   ++counters_.scans;
-  vehicle_W_ = camera_[0].p_WC;
-  const std::size_t count = order_bricks(request);
-  Status status = Status::kOk;
-  double reach_m = 1e18;
-  for (std::size_t i = 0; i < count; ++i) {
-    const bool finished = clear_brick(order_[i], request, budget, result.work);
-    if (!finished || result.work.volume_m3 >= request.volume_m3) {
-      if (i + 1 < count) {
-        status = Status::kBudgetSpent;
-        reach_m = order_key_[order_[i]] * kOrderStep_m;
-      }
-      break;
-    }
-  }
+  vehicle_W_ = cameras_.camera[0].p_WC;
+  const std::size_t count = order_blocks(request);
+  const std::size_t done = clear_blocks(count, request, budget, result.work);
+  const double reach_m =
+      done < count && done > 0 ? order_key_[order_[done - 1]] * kOrderStep_m : (done < count ? 0.0 : 1e18);
   free_vehicle();
   add_surfaces(request, reach_m, result.work);
   refresh_dirty();
-  return status;
+  return done < count ? Status::kBudgetSpent : Status::kOk;
 }
 
 }  // namespace roborun::stages

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stages/perception/block_sight.hpp"
+
 namespace roborun::stages {
 
 Status check_frame(const PosedDepthFrame& posed) noexcept {
@@ -10,8 +12,8 @@ Status check_frame(const PosedDepthFrame& posed) noexcept {
   const bool size_ok = f.width >= 8 && f.height >= 8 && f.width <= DepthPyramid::kMaxPixels &&
                        f.height <= DepthPyramid::kMaxPixels &&
                        f.depth_m.size() == std::size_t{f.width} * std::size_t{f.height};
-  const bool optics_ok = std::isfinite(f.range_m) && f.range_m > 0.0F &&
-                         std::isfinite(f.tan_half_fov_ratio) && f.tan_half_fov_ratio > 0.0F;
+  const bool optics_ok = f.range_m > 0.0F && f.range_m <= kMaxRange_m && f.tan_half_fov_ratio > 0.0F &&
+                         f.tan_half_fov_ratio <= kMaxTanHalfFov;
   if (!size_ok || !optics_ok || !is_finite(posed.X_WC.p_RT) || !posed.X_WC.R_RT.allFinite())
     return Status::kInvalidArgument;
   const bool any_valid = std::any_of(f.depth_m.begin(), f.depth_m.end(), [](float d) { return d > 0.0F; });
@@ -20,93 +22,109 @@ Status check_frame(const PosedDepthFrame& posed) noexcept {
 
 namespace {
 
+using Entry = DepthPyramid::Entry;
+
+Entry entry_of(float visible_m, float range_m, float steps_per_m) noexcept {
+  // The whole range is its own step: what is empty up to the range satisfies every need within it.
+  const std::int32_t least =
+      visible_m < range_m ? static_cast<std::int32_t>(visible_m * steps_per_m) : DepthPyramid::kMaxSteps;
+  const std::int32_t most = visible_m < range_m ? least + 1 : DepthPyramid::kMaxSteps;
+  return {static_cast<std::int16_t>(least), static_cast<std::int16_t>(DepthPyramid::kMaxSteps - most)};
+}
+
+std::int16_t min16(std::int16_t a, std::int16_t b) noexcept { return a < b ? a : b; }
+
+Entry min_of(Entry a, Entry b) noexcept {
+  return {min16(a.least_steps, b.least_steps), min16(a.not_most_steps, b.not_most_steps)};
+}
+
 /// See the class comment: a lone dropout counts as the nearest of its neighbours.
-void bridge_single_dropouts(const firmware_if::DepthFrame& frame,
-                            std::span<DepthPyramid::Bound> entry) noexcept {
+float bridged_m(const firmware_if::DepthFrame& frame, std::size_t x, std::size_t y) noexcept {
   const std::size_t width = frame.width;
-  const auto seen_m = [&frame](std::size_t i) { return visible_depth_m(frame.depth_m[i], frame.range_m); };
-  for (std::size_t y = 0; y < frame.height; ++y) {
-    for (std::size_t x = 0; x < width; ++x) {
-      const std::size_t i = y * width + x;
-      if (frame.depth_m[i] > 0.0F) continue;
-      float nearest_m = frame.range_m;
-      if (x > 0) nearest_m = std::min(nearest_m, seen_m(i - 1));
-      if (x + 1 < width) nearest_m = std::min(nearest_m, seen_m(i + 1));
-      if (y > 0) nearest_m = std::min(nearest_m, seen_m(i - width));
-      if (y + 1 < frame.height) nearest_m = std::min(nearest_m, seen_m(i + width));
-      entry[i] = {nearest_m, nearest_m};
-    }
+  const std::size_t i = y * width + x;
+  const auto seen_m = [&frame](std::size_t k) { return visible_depth_m(frame.depth_m[k], frame.range_m); };
+  float nearest_m = frame.range_m;
+  if (x > 0) nearest_m = std::min(nearest_m, seen_m(i - 1));
+  if (x + 1 < width) nearest_m = std::min(nearest_m, seen_m(i + 1));
+  if (y > 0) nearest_m = std::min(nearest_m, seen_m(i - width));
+  if (y + 1 < frame.height) nearest_m = std::min(nearest_m, seen_m(i + width));
+  return nearest_m;
+}
+
+std::size_t entry_count(std::size_t max_side) noexcept {
+  std::size_t total = 2 * max_side * max_side + DepthPyramid::kMaxLevels;
+  for (std::size_t side = max_side; side > 1;) {
+    side = (side + 1) / 2;
+    total += side * side;
   }
+  return total;
 }
 
 }  // namespace
 
+std::size_t DepthPyramid::arena_bytes(std::size_t max_side) noexcept {
+  return entry_count(max_side) * sizeof(Entry) + alignof(std::max_align_t);
+}
+
 DepthPyramid::DepthPyramid(core::Arena& arena, std::size_t max_side) noexcept : max_side_(max_side) {
-  std::size_t total = 0;
-  for (std::size_t side = max_side;; side = (side + 1) / 2) {
-    total += side * side;
-    if (side == 1) break;
+  memory_ = arena.take<Entry>(entry_count(max_side), "map depth pyramid");
+}
+
+void DepthPyramid::fill_pixels(const firmware_if::DepthFrame& frame, Entry* pixel) noexcept {
+  if (depth_steps(frame.depth_m, frame.range_m, steps_per_m_, pixel) == 0) return;
+  for (std::size_t y = 0; y < frame.height; ++y) {
+    for (std::size_t x = 0; x < frame.width; ++x) {
+      const std::size_t i = y * frame.width + x;
+      if (!(frame.depth_m[i] > 0.0F))
+        pixel[i] = entry_of(bridged_m(frame, x, y), frame.range_m, steps_per_m_);
+    }
   }
-  memory_ = arena.take<Bound>(total);
 }
 
 Status DepthPyramid::build(const firmware_if::DepthFrame& frame) noexcept {
   if (frame.width > max_side_ || frame.height > max_side_ || memory_.empty()) return Status::kCapacity;
-  int width = frame.width;
-  int height = frame.height;
-  std::size_t used = 0;
-  level_count_ = 0;
-  for (std::size_t k = 0; k < kMaxLevels; ++k) {
-    Level& level = level_[k];
-    const auto count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-    level = {memory_.subspan(used, count), width, height};
-    used += count;
-    ++level_count_;
-    if (k == 0) {
-      for (std::size_t i = 0; i < count; ++i) {
-        const float visible_m = visible_depth_m(frame.depth_m[i], frame.range_m);
-        level.entry[i] = {visible_m, visible_m};
-      }
-      bridge_single_dropouts(frame, level.entry);
-    } else {
-      const Level& fine = level_[k - 1];
-      for (int y = 0; y < height; ++y) {
-        for (int x = 0; x < width; ++x) {
-          const int x1 = std::min(2 * x + 1, fine.width - 1);
-          const int y1 = std::min(2 * y + 1, fine.height - 1);
-          const auto at = [&fine](int ix, int iy) { return fine.entry[fine.index(ix, iy)]; };
-          const Bound a = at(2 * x, 2 * y);
-          const Bound b = at(x1, 2 * y);
-          const Bound c = at(2 * x, y1);
-          const Bound d = at(x1, y1);
-          level.entry[level.index(x, y)] = {
-              std::min(std::min(a.least_m, b.least_m), std::min(c.least_m, d.least_m)),
-              std::max(std::max(a.most_m, b.most_m), std::max(c.most_m, d.most_m))};
-        }
+  steps_per_m_ = static_cast<float>(kMaxSteps - 1) / frame.range_m;
+  std::size_t width = frame.width;
+  std::size_t height = frame.height;
+  Entry* fine = memory_.data();
+  fill_pixels(frame, fine);
+  level_[0] = {fine, static_cast<std::int32_t>(width), 0, 1};
+  for (int k = 1; k < kMaxLevels; ++k) {
+    // From windows of half the side: this one and the one after it, in both directions.
+    const std::size_t stride = k == 1 ? 1 : 2;
+    const std::size_t to_width = (width + stride - 1) / stride;
+    const std::size_t to_height = (height + stride - 1) / stride;
+    Entry* coarse = fine + width * height;
+    for (std::size_t y = 0; y < to_height; ++y) {
+      const Entry* above = fine + stride * y * width;
+      const Entry* below = fine + std::min(stride * y + stride, height - 1) * width;
+      Entry* to = coarse + y * to_width;
+      const std::size_t inner = width > stride ? (width - 1) / stride : 0;
+      least_of_four(above, below, stride, inner, to);
+      for (std::size_t x = inner; x < to_width; ++x) {
+        const std::size_t last = width - 1;
+        to[x] = min_of(min_of(above[stride * x], above[last]), min_of(below[stride * x], below[last]));
       }
     }
-    if (width == 1 && height == 1) break;
-    width = (width + 1) / 2;
-    height = (height + 1) / 2;
+    level_[static_cast<std::size_t>(k)] = {coarse, static_cast<std::int32_t>(to_width), k - 1, 2};
+    fine = coarse;
+    width = to_width;
+    height = to_height;
   }
   return Status::kOk;
 }
 
 DepthPyramid::Bound DepthPyramid::bound(int u0, int v0, int u1, int v1) const noexcept {
-  int shift = 0;
-  const int last = static_cast<int>(level_count_) - 1;
-  while (shift < last && (((u1 >> shift) - (u0 >> shift)) > 2 || ((v1 >> shift) - (v0 >> shift)) > 2))
-    ++shift;
-  const Level& level = level_[static_cast<std::size_t>(shift)];
-  Bound result{3.0e38F, 0.0F};
-  for (int y = v0 >> shift; y <= v1 >> shift; ++y) {
-    for (int x = u0 >> shift; x <= u1 >> shift; ++x) {
-      const Bound& entry = level.entry[level.index(x, y)];
-      result.least_m = std::min(result.least_m, entry.least_m);
-      result.most_m = std::max(result.most_m, entry.most_m);
-    }
-  }
-  return result;
+  const Level& l = level(level_for(std::max(u1 - u0, v1 - v0) + 1));
+  const auto first = [&l](int from) { return from >> l.shift; };
+  const auto last = [&l, first](int from, int to) {
+    return std::max(((to + (1 << l.shift)) >> l.shift) - l.back, first(from));
+  };
+  const auto at = [&l](int x, int y) { return l.entry[y * l.width + x]; };
+  const int x0 = first(u0), x1 = last(u0, u1), y0 = first(v0), y1 = last(v0, v1);
+  const Entry e = min_of(min_of(at(x0, y0), at(x1, y0)), min_of(at(x0, y1), at(x1, y1)));
+  return {static_cast<float>(std::min<std::int32_t>(e.least_steps, kMaxSteps - 1)) / steps_per_m_,
+          static_cast<float>(kMaxSteps - e.not_most_steps) / steps_per_m_};
 }
 
 }  // namespace roborun::stages

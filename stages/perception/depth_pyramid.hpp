@@ -1,4 +1,4 @@
-/// A depth image as a min/max pyramid: how far is every pixel of a rectangle known to see, at least and at
+/// A depth image as a pyramid of bounds: how far is every pixel of a rectangle known to see, at least and at
 /// most?
 #pragma once
 
@@ -11,9 +11,12 @@
 
 namespace roborun::stages {
 
-/// kOk if a frame may be used at all: 8..512 pixels a side, as many depths as pixels, finite positive range
-/// and field of view, finite pose, and at least one pixel that is not NaN or <= 0. Otherwise
-/// kInvalidArgument. O(pixels) at worst.
+inline constexpr float kMaxRange_m = 300.0F;
+inline constexpr float kMaxTanHalfFov = 2.0F;
+
+/// kOk if a frame may be used at all: 8..512 pixels a side, as many depths as pixels, range in (0,
+/// kMaxRange_m] and field of view in (0, kMaxTanHalfFov], finite pose, and at least one pixel that is not NaN
+/// or <= 0. Otherwise kInvalidArgument. O(pixels) at worst.
 [[nodiscard]] Status check_frame(const PosedDepthFrame& posed) noexcept;
 
 /// Visible depth of a pixel: its depth, or the range where nothing returned; 0 where there is no information.
@@ -24,39 +27,58 @@ namespace roborun::stages {
 
 /// A pixel without information (NaN or <= 0) whose neighbours above, below, left and right all have some
 /// counts as the nearest of them: a camera loses one pixel in 200 at random, and near cells have thousands.
-/// Larger holes see nothing. Entry (x, y) of level k covers 2^k x 2^k pixels. Memory from the arena: 8/3
-/// bytes x 4 a pixel.
+/// Larger holes see nothing.
+///
+/// Depths are whole steps of range / 32766, rounded so that bounds stay bounds. Level 0 holds the pixels; an
+/// entry of level k >= 1 covers 2^k x 2^k pixels and they stand 2^(k-1) apart, so that they overlap: any
+/// rectangle of up to 2^k + 2 pixels a side is covered by four of them, with less than 2^(k-1) pixels too
+/// many on each side (none at level 1). Memory from the arena: 10/3 x 4 bytes a pixel.
 class DepthPyramid {
  public:
-  static constexpr std::size_t kMaxLevels = 10;
+  static constexpr int kMaxLevels = 11;
   static constexpr std::size_t kMaxPixels = 512;
+  static constexpr std::int32_t kMaxSteps = 32767;  ///< "Nothing within the range".
 
+  /// Two bounds in one word, so that both combine by the same minimum.
+  struct Entry {
+    std::int16_t least_steps;     ///< No pixel sees less far; 0 if one has no information.
+    std::int16_t not_most_steps;  ///< kMaxSteps minus what no pixel sees beyond.
+  };
+  struct Level {
+    const Entry* entry{};
+    std::int32_t width{};  ///< Entries a row.
+    int shift{};           ///< Entries stand 2^shift pixels apart.
+    /// The last entry of the four starts at ((last pixel + 2^shift) >> shift) - back.
+    std::int32_t back{};
+  };
   struct Bound {
-    float least_m;  ///< No pixel of the rectangle sees less far; 0 if one has no information.
-    float most_m;   ///< No pixel of the rectangle sees farther.
+    float least_m;
+    float most_m;
   };
 
+  /// Bytes that the constructor takes from the arena.
+  [[nodiscard]] static std::size_t arena_bytes(std::size_t max_side) noexcept;
   /// Room for images of up to max_side x max_side pixels.
   DepthPyramid(core::Arena& arena, std::size_t max_side) noexcept;
   /// kCapacity if the image is larger than planned. O(pixels).
   [[nodiscard]] Status build(const firmware_if::DepthFrame& frame) noexcept;
-  /// Pixels [u0, u1] x [v0, v1], inside the image. Conservative: reads at most 3 x 3 entries, which may cover
-  /// more.
+  /// The level for rectangles of up to this many pixels a side: the least k with side <= 2^k + 2. O(1).
+  [[nodiscard]] static constexpr int level_for(std::int32_t side) noexcept {
+    if (side <= 4) return side <= 2 ? 0 : 1;
+    return 32 - __builtin_clz(static_cast<unsigned>(side - 3));
+  }
+  [[nodiscard]] const Level& level(int k) const noexcept { return level_[static_cast<std::size_t>(k)]; }
+  [[nodiscard]] float steps_per_m() const noexcept { return steps_per_m_; }
+  /// Pixels [u0, u1] x [v0, v1], inside the image. Conservative. O(1).
   [[nodiscard]] Bound bound(int u0, int v0, int u1, int v1) const noexcept;
 
  private:
-  struct Level {
-    std::span<Bound> entry{};
-    int width{};
-    int height{};
-    [[nodiscard]] std::size_t index(int x, int y) const noexcept {
-      return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
-    }
-  };
+  void fill_pixels(const firmware_if::DepthFrame& frame, Entry* pixel) noexcept;
+
   std::size_t max_side_;
-  std::size_t level_count_{0};
+  float steps_per_m_{0.0F};
   std::array<Level, kMaxLevels> level_{};
-  std::span<Bound> memory_{};
+  std::span<Entry> memory_{};
 };
 
 }  // namespace roborun::stages

@@ -10,9 +10,10 @@
 namespace roborun::stages {
 
 PointCloud::PointCloud(const Config& config, core::Arena& arena) noexcept
-    : grid_(arena.take<Entry>(config.max_points)),
-      point_(arena.take<CloudPoint>(config.max_points)),
-      used_(arena.take<std::uint32_t>(config.max_points)) {}
+    : grid_(arena.take<Entry>(config.max_points, "cloud grid")),
+      point_(arena.take<CloudPoint>(config.max_points, "cloud points")),
+      point_pool_(arena.last_pool()),
+      used_(arena.take<std::uint32_t>(config.max_points, "cloud used entries")) {}
 
 void PointCloud::set_height_limits(double low_m, double high_m) noexcept {
   low_m_ = low_m;
@@ -31,7 +32,7 @@ bool PointCloud::add(const Vector3& p_W, double cell_m) noexcept {
   while (grid_[slot].key != 0 && grid_[slot].key != key)
     slot = (slot + 1) & mask;  // bounded: never more than 3/4 full
   if (grid_[slot].key == 0) {
-    if (count_ >= grid_.size() - grid_.size() / 4) {
+    if (point_pool_.exhausted() || count_ >= grid_.size() - grid_.size() / 4) {
       ++counters_.points_dropped;
       return false;
     }
@@ -88,6 +89,7 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core
     }
   }
   for (std::size_t i = 0; i < count_; ++i) point_[i].p_W /= point_[i].count;
+  point_pool_.use(count_);
   if (usable == 0) return Status::kInvalidArgument;
   if (spent) return Status::kBudgetSpent;
   return full ? Status::kCapacity : Status::kOk;

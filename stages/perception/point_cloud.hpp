@@ -63,6 +63,7 @@ class PointCloud {
 
   std::span<Entry> grid_;
   std::span<CloudPoint> point_;
+  core::PoolRecord& point_pool_;
   std::span<std::uint32_t> used_;  ///< Grid entries to clear before the next step.
   std::size_t count_{0};
   double seen_volume_m3_{0.0};

@@ -27,7 +27,8 @@ class NodeGrid {
     return max_points * sizeof(Point) + kCells * sizeof(std::int32_t) + 64;
   }
   NodeGrid(std::size_t max_points, core::Arena& arena) noexcept
-      : point_(arena.take<Point>(max_points)), head_(arena.take<std::int32_t>(kCells)) {}
+      : point_(arena.take<Point>(max_points, "planner grid points")),
+        head_(arena.take<std::int32_t>(kCells, "planner grid cells")) {}
 
   /// Forgets all points. Precondition: a finite box that is not empty.
   void reset(const Aabb& box_W) noexcept;

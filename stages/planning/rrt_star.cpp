@@ -28,8 +28,9 @@ Vector3 towards_goal(const PlanRequest& request) noexcept {
 
 RrtStar::RrtStar(const Config& config, core::Arena& arena) noexcept
     : config_(config),
-      node_(arena.take<Node>(config.max_nodes)),
-      visited_(arena.take<std::uint64_t>(kVisited)),
+      node_(arena.take<Node>(config.max_nodes, "planner nodes")),
+      node_pool_(arena.last_pool()),
+      visited_(arena.take<std::uint64_t>(kVisited, "planner visited cells")),
       grid_(config.max_nodes, arena) {}
 
 double RrtStar::promise_m(const Node& node, const Vector3& goal_W) const noexcept {
@@ -72,6 +73,7 @@ Vector3 RrtStar::sample(Search& s) const noexcept {
 std::int32_t RrtStar::add_node(const Vector3& p_W, std::int32_t parent, core::Work& work) noexcept {
   const auto index = static_cast<std::int32_t>(count_);
   node_[count_++] = {p_W, 0.0, parent, -1, -1};
+  node_pool_.use(count_);
   grid_.insert(p_W);
   if (parent >= 0) {
     Node& self = node_[count_ - 1];
@@ -152,8 +154,9 @@ std::int32_t RrtStar::try_extend(Search& s, const Vector3& sample_W, double boun
   for (; tried < count && self < 0; ++tried) {
     const NodeGrid::Near& candidate = near[order[tried]];
     if (cost_by(order[tried]) + to_goal_m >= bound_m) return -1;
-    if (is_segment_free(s.view, node(candidate.index).p_W, p_W, request.radius_m, s.work.units))
-      self = add_node(p_W, candidate.index, s.work);
+    if (!is_segment_free(s.view, node(candidate.index).p_W, p_W, request.radius_m, s.work.units)) continue;
+    if (!may_add()) return -1;
+    self = add_node(p_W, candidate.index, s.work);
   }
   if (self < 0) return -1;
   const double cost_m = node(self).cost_m;
@@ -267,7 +270,7 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::Stag
     if (free_m > 1.0) {
       const Vector3 end_W = request.start_W + (target_W - request.start_W) * (free_m / to_target_m);
       // Checked once more: this is an edge, and its samples lie elsewhere.
-      if (is_segment_free(view, request.start_W, end_W, request.radius_m, work.units))
+      if (is_segment_free(view, request.start_W, end_W, request.radius_m, work.units) && may_add())
         best = add_node(end_W, 0, work);
     }
     if (best > 0 && free_m >= to_target_m && request.bounds_W.contains(target_W)) {

@@ -71,6 +71,8 @@ class RrtStar final : public Planner {
 
   [[nodiscard]] Node& node(std::int32_t index) noexcept { return node_[static_cast<std::size_t>(index)]; }
   [[nodiscard]] bool full() const noexcept { return count_ == node_.size(); }
+  /// To be asked before each add_node().
+  [[nodiscard]] bool may_add() noexcept { return !full() && !node_pool_.exhausted(); }
   /// The tree is the start alone.
   void clear(Search& s) noexcept;
   std::int32_t add_node(const Vector3& p_W, std::int32_t parent, core::Work& work) noexcept;
@@ -108,6 +110,7 @@ class RrtStar final : public Planner {
 
   Config config_;
   std::span<Node> node_;
+  core::PoolRecord& node_pool_;
   std::span<std::uint64_t> visited_;
   NodeGrid grid_;
   std::size_t count_{0};

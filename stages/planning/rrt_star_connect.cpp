@@ -22,7 +22,7 @@ constexpr std::uint32_t kSpliceEvery = 2;
 std::int32_t RrtStar::advance(Search& s, std::int32_t from) noexcept {
   const Vector3& goal_W = s.request.goal_W;
   // Every step is shorter than the way that is left by the step's length, or ends at the goal.
-  while (!full()) {
+  while (may_add()) {
     const Vector3 way = goal_W - node(from).p_W;
     const double to_goal_m = way.norm();
     if (to_goal_m <= config_.step_m) {
@@ -76,7 +76,7 @@ bool RrtStar::find_first(Search& s) noexcept {
     p_W = p_W.cwiseMax(request.bounds_W.min_W).cwiseMin(request.bounds_W.max_W);
     ++failures;
     if ((p_W - node(from).p_W).norm() < kShortEdge_m || (p_W - request.start_W).norm() > request.horizon_m ||
-        !is_segment_free(s.view, node(from).p_W, p_W, request.radius_m, s.work.units))
+        !is_segment_free(s.view, node(from).p_W, p_W, request.radius_m, s.work.units) || !may_add())
       continue;
     const std::int32_t end = advance(s, add_node(p_W, from, s.work));
     const double gain_m = (request.goal_W - node(front).p_W).norm() - (request.goal_W - node(end).p_W).norm();
@@ -98,7 +98,7 @@ bool RrtStar::path_to(std::int32_t index, Path& path_W) const noexcept {
 
 void RrtStar::add_path(const Path& path_W, core::Work& work) noexcept {
   std::int32_t parent = 0;
-  for (std::size_t i = 1; i + 1 < path_W.size() && !full(); ++i) parent = add_node(path_W[i], parent, work);
+  for (std::size_t i = 1; i + 1 < path_W.size() && may_add(); ++i) parent = add_node(path_W[i], parent, work);
   const double cost_m = node(parent).cost_m + (node(goal_).p_W - node(parent).p_W).norm();
   if (parent > 0 && node(parent).p_W == path_W[path_W.size() - 2] && cost_m < node(goal_).cost_m)
     reparent(goal_, parent, cost_m);

@@ -1,3 +1,5 @@
+#include "platform/sitl/world/octomap_file.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,7 +16,7 @@
 namespace roborun::sitl {
 namespace {
 
-constexpr int kDepth = 16;
+constexpr int kDepth = kOctomapDepth;
 constexpr double kMaxVoxels = 4e9;  // bits of the dense grid: 512 MB
 
 struct Leaf {
@@ -148,6 +150,21 @@ void walk(std::span<const unsigned char> data, bool full, const std::string& nam
 }
 
 }  // namespace
+
+OctomapLeaves read_octomap(std::span<const unsigned char> bytes, bool full, const std::string& name) {
+  const Header header = parse_header(bytes, full, name);
+  OctomapLeaves map;
+  map.resolution_m = header.resolution_m;
+  // File order is Morton order, because children come by number: x, then y, then z.
+  walk(bytes.subspan(header.data), full, name, [&](const Leaf& leaf, bool occupied) {
+    map.leaves.push_back(
+        {octomap_morton({static_cast<std::int32_t>(leaf.first[0]), static_cast<std::int32_t>(leaf.first[1]),
+                         static_cast<std::int32_t>(leaf.first[2])}),
+         static_cast<std::int32_t>(leaf.size), occupied});
+  });
+  if (map.leaves.empty()) refuse(name, "the OctoMap tree is empty: no leaf is known");
+  return map;
+}
 
 VoxelGrid parse_octomap(std::span<const unsigned char> bytes, bool full, const std::string& name) {
   const Header header = parse_header(bytes, full, name);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "platform/sitl/world/input_error.hpp"
+#include "platform/sitl/world/octomap_file.hpp"
 #include "platform/sitl/world/toml_reader.hpp"
 
 namespace roborun::sitl {
@@ -132,6 +133,11 @@ WorldDescription read_octomap(const std::string& path, const std::vector<unsigne
 }
 
 }  // namespace
+
+OctomapLeaves load_octomap(const std::string& path) {
+  const bool full = is_full_octomap(path);
+  return read_octomap(read_file(path), full, path);
+}
 
 World load_world(const std::string& path, const Endpoints& endpoints) {
   const auto ends_with = [&path](std::string_view end) {

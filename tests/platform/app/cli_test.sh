@@ -42,7 +42,28 @@ refuses "must end in .toml, .bt or .ot" fly --world nope.xyz
 refuses "X,Y,Z" fly --world "$data/worlds/two_pillars.toml" --start 1,2
 refuses "cannot be opened" fly --settings nope.toml
 refuses "--nope" fly --nope
+refuses "--props-off" can send-esc can0 --seconds 1
+refuses "nocan7" can monitor nocan7
+refuses "cannot be opened" can decode --candump nope.log
+refuses "required" gpio check --open x
 refuses "subcommand" 
+refuses "1 to 86400" audit --seconds 0
+refuses "SLOT:MILLISECONDS" audit --inject-spin nope:5
+refuses "cannot be opened" audit --compare nope.json nope.json
+refuses "is not the JSON of an audit" audit --compare "$data/worlds/two_pillars.toml" "$data/worlds/two_pillars.toml"
+refuses "1 .. 27" memory --env 99
+# Without privileges real time is refused by name, and only --best-effort runs on.
+if [[ $(id -u) -eq 0 ]] && command -v setpriv >/dev/null && [[ $(ulimit -r) -eq 0 ]]; then
+  copy=$(mktemp -d) && chmod 755 "$copy" && cp "$roborun" "$copy/roborun"
+  real=$roborun
+  roborun=$copy/as_nobody
+  printf '#!/bin/sh\nXDG_CACHE_HOME=/tmp/roborun_cli_test exec setpriv --reuid=65534 --regid=65534 --clear-groups --bounding-set=-all "%s" "$@"\n' "$copy/roborun" >"$roborun"
+  chmod 755 "$roborun"
+  "$roborun" audit --seconds 1 >/dev/null 2>&1  # the first run measures the host, and says so in a line of its own
+  refuses "real-time priority" audit --seconds 1
+  rm -rf "$copy" /tmp/roborun_cli_test
+  roborun=$real
+fi
 printf '[world]\nbounds = [[0,0,0],[9,9,9]]\nstart = [1,1,1]\ngoal = [5,5,5]\nwalls = 3\n' >/tmp/roborun_bad.$$.toml
 refuses ":5: walls: unknown key" fly --world /tmp/roborun_bad.$$.toml
 printf '[camera]\npixels = 9999\n' >/tmp/roborun_bad.$$.toml

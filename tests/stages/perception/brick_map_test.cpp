@@ -16,7 +16,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 TEST(Brick, MipsSayWhatTheCellsSay) {
   core::CounterRng rng(1);
   auto sut = std::make_unique<Brick>();
-  sut->clear(0, 0, 0);
+  sut->fill(evidence::kUnknown);
   for (std::int8_t& c : sut->cell) {
     const auto kind = rng.below(20);
     c = kind == 0 ? evidence::kUnknown : (kind == 1 ? evidence::kHit : evidence::kFree);
@@ -157,7 +157,7 @@ TEST_F(SmallBrickMap, GivesUpTheFarthestBricksWhenFull) {
     (void)sut_->integrate({scene_.look(p), 0, kInfinity, here}, unlimited_, result_);
   }
   EXPECT_GT(sut_->counters().bricks_given_up + sut_->counters().bricks_refused, 0U);
-  EXPECT_LE(sut_->known_volume_m3(), 64 * 4.8 * 4.8 * 4.8 + 1e-6);
+  EXPECT_LE(sut_->used_bytes(), 64 * sizeof(Brick) + 2048 * sizeof(std::int32_t));
   core::Work work;
   (void)sut_->export_view({0, kInfinity, Vector3(20, 10, 5)}, unlimited_, work);
   std::uint64_t lookups = 0;

@@ -1,0 +1,169 @@
+#include "core/executive/lane_executive.hpp"
+
+#include <algorithm>
+#include <bit>
+
+namespace roborun::core {
+namespace {
+
+constexpr std::uint32_t bit(SlotId slot) noexcept { return 1U << static_cast<std::uint32_t>(slot); }
+
+}  // namespace
+
+void Reactions::brake(SlotId slot, bool on) noexcept {
+  if (on)
+    brake_.fetch_or(bit(slot), std::memory_order_acq_rel);
+  else
+    brake_.fetch_and(~bit(slot), std::memory_order_acq_rel);
+}
+
+void Reactions::stop(SlotId slot) noexcept {
+  std::uint32_t none = 0;
+  (void)stop_.compare_exchange_strong(none, bit(slot), std::memory_order_acq_rel);
+}
+
+SlotId Reactions::stopped_by() const noexcept {
+  return static_cast<SlotId>(std::countr_zero(stop_.load(std::memory_order_acquire)));
+}
+
+LaneExecutive::LaneExecutive(LaneId id, const firmware_if::Clock& clock, LaneProgram& program,
+                             Reactions& reactions, TraceRing* trace) noexcept
+    : id_(id), clock_(clock), program_(program), reactions_(reactions), trace_(trace) {
+  while (kFrameTable[first_].lane != id) ++first_;
+  while (first_ + count_ < kSlotCount && kFrameTable[first_ + count_].lane == id) ++count_;
+  start(MonotonicTime{});
+}
+
+void LaneExecutive::start(MonotonicTime first_release) noexcept {
+  release_ = first_release;
+  in_frame_ = false;
+}
+
+void LaneExecutive::begin_frame() noexcept {
+  if (!awake_) woke_ = clock_.now();
+  awake_ = false;
+  lane_.jitter.add(woke_ - release_);
+  period_ = lane(id_).period;
+  at_ = 0;
+  in_frame_ = true;
+  ending_ = false;
+  for (std::size_t i = 0; i < count_; ++i) {
+    now_[i] = {};
+    now_[i].budget = kFrameTable[first_ + i].budget;
+    if (degrade_next_[i]) now_[i].budget /= 2;
+  }
+  charged_ = kFrameTable[first_].id;
+  mark_ = woke_;
+}
+
+void LaneExecutive::charge_to(SlotId id) noexcept {
+  const MonotonicTime now = clock_.now();
+  now_[index(charged_)].spent += now - mark_;
+  mark_ = now;
+  charged_ = id;
+  Present& present = now_[index(id)];
+  if (!present.ran) present.begin = now;
+  present.ran = true;
+}
+
+Nanos LaneExecutive::spent(SlotId id) const noexcept {
+  return now_[index(id)].spent + (id == charged_ ? clock_.now() - mark_ : Nanos{0});
+}
+
+Nanos LaneExecutive::grant(SlotId id, Nanos wanted) noexcept {
+  Present& present = now_[index(id)];
+  const Nanos cut = degrade_next_[index(id)] ? wanted / 2 : wanted;
+  present.budget = std::max(std::min(present.budget, cut), Nanos{1});
+  return present.budget;
+}
+
+void LaneExecutive::set_period(Nanos period) noexcept {
+  const Nanos quantum = lane(id_).quantum;
+  const std::int64_t whole = (period.count() + quantum.count() - 1) / quantum.count();
+  period_ = std::max<std::int64_t>(whole, 1) * quantum;
+}
+
+void LaneExecutive::step() noexcept {
+  if (!in_frame_) begin_frame();
+  if (skip_next_[at_]) {
+    skip_next_[at_] = false;
+    ++slot_[at_].skipped;
+  } else {
+    const SlotId id = kFrameTable[first_ + at_].id;
+    charge_to(id);
+    program_.run(id, *this);
+  }
+  ++at_;
+  if (at_ == count_ || ending_) finish_frame();
+}
+
+void LaneExecutive::judge(const SlotSpec& spec, const Present& present) noexcept {
+  const std::size_t i = index(spec.id);
+  SlotStatistics& s = slot_[i];
+  if (present.spent > s.time.max()) s.longest = {lane_.frames, present.begin, present.work};
+  s.time.add(present.spent);
+  s.maxima.add(present.spent);
+  const double margin_ratio =
+      1.0 - static_cast<double>(present.spent.count()) / static_cast<double>(present.budget.count());
+  if (s.time.count() == 1 || margin_ratio < s.margin_ratio) {
+    s.margin_ratio = margin_ratio;
+    s.budget = present.budget;
+  }
+  const bool overrun = present.spent > present.budget;
+  if (trace_ != nullptr) trace_->push({spec.id, lane_.frames, present.begin, present.spent, overrun});
+  degrade_next_[i] = false;
+  if (!overrun) {
+    if (spec.on_overrun == OverrunPolicy::kBrake && in_a_row_[i] >= spec.overruns_to_act)
+      reactions_.brake(spec.id, false);
+    in_a_row_[i] = 0;
+    return;
+  }
+  ++s.overruns;
+  if (++in_a_row_[i] < spec.overruns_to_act) return;
+  ++s.reactions;
+  switch (spec.on_overrun) {
+    case OverrunPolicy::kSkip:
+      skip_next_[i] = true;
+      in_a_row_[i] = 0;
+      break;
+    case OverrunPolicy::kDegrade:
+      degrade_next_[i] = true;
+      break;
+    case OverrunPolicy::kBrake:
+      reactions_.brake(spec.id, true);
+      break;
+    case OverrunPolicy::kStop:
+      reactions_.stop(spec.id);
+      break;
+  }
+}
+
+void LaneExecutive::finish_frame() noexcept {
+  const MonotonicTime done = clock_.now();
+  now_[index(charged_)].spent += done - mark_;
+  Nanos of_stages{0};
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (!now_[i].ran) continue;
+    const SlotSpec& spec = kFrameTable[first_ + i];
+    judge(spec, now_[i]);
+    if (spec.is_stage) of_stages += now_[i].spent;
+  }
+  in_frame_ = false;
+  ++lane_.frames;
+
+  const MonotonicTime due = release_ + period_;
+  const MonotonicTime end = clock_.now();
+  if (end > due) ++lane_.deadline_misses;
+  lane_.response.add(end - release_);
+  lane_.overhead.add((end - woke_) - of_stages);
+  const Nanos quantum = lane(id_).quantum;
+  MonotonicTime next = due;
+  if (end > due) {
+    const std::int64_t late = ((end - due).count() + quantum.count() - 1) / quantum.count();
+    lane_.slips += static_cast<std::uint64_t>(late);
+    next += late * quantum;
+  }
+  release_ = next;
+}
+
+}  // namespace roborun::core

@@ -1,0 +1,156 @@
+#include "platform/app/audit_command.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "platform/app/board_profile.hpp"
+#include "platform/app/real_time_run.hpp"
+#include "platform/report/trace_csv.hpp"
+#include "platform/sitl/world/generator.hpp"
+#include "platform/sitl/world/input_error.hpp"
+
+namespace roborun::app {
+namespace {
+
+using sitl::InputError;
+
+struct Options {
+  double seconds{60.0};
+  std::string env{"14"};
+  std::uint64_t seed{1};
+  bool load{false};
+  bool json{false};
+  bool best_effort{false};
+  std::string html;
+  std::string trace;
+  std::vector<std::string> compare;
+  double tolerance_ratio{1.5};
+  std::string spin;
+};
+
+std::string read_all(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw InputError(fmt::format("{}: cannot be opened", path));
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+int compare(const Options& options) {
+  if (!(options.tolerance_ratio >= 1.0 && options.tolerance_ratio <= 100.0))
+    throw InputError(
+        fmt::format("--tolerance: {} is out of range: must be from 1 to 100", options.tolerance_ratio));
+  const std::string before = read_all(options.compare[0]), after = read_all(options.compare[1]);
+  report::Comparison result;
+  try {
+    result = report::compare_audits(before, after, options.tolerance_ratio);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(
+        fmt::format("--compare: {} or {} {}", options.compare[0], options.compare[1], error.what()));
+  }
+  fmt::print("{:<34} {:>12} {:>12}\n{}", "", "before", "after", result.table);
+  for (const std::string& note : result.notes) fmt::print("note: {}\n", note);
+  fmt::print("{}\n",
+             result.worse.empty() ? "no regression" : fmt::format("{} regressions", result.worse.size()));
+  return result.worse.empty() ? 0 : 1;
+}
+
+/// SLOT:MILLISECONDS, in every frame from the 4000th (10 s) of the flight lane or the 400th of others on.
+std::optional<Injection> injection_of(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const std::size_t colon = text.find(':');
+  char* end = nullptr;
+  const double ms = colon == std::string::npos ? 0.0 : std::strtod(text.c_str() + colon + 1, &end);
+  for (const core::SlotSpec& spec : core::kFrameTable) {
+    if (colon == std::string::npos || text.substr(0, colon) != spec.name || end == nullptr || *end != '\0' ||
+        !(ms > 0.0 && ms <= 3.6e6))
+      continue;
+    return Injection{spec.id, from_seconds(1e-3 * ms), 400, UINT64_MAX, false};
+  }
+  throw InputError(
+      fmt::format("--inject-spin: '{}' must be SLOT:MILLISECONDS, with a slot of the frame table", text));
+}
+
+int audit(const Options& options) {
+  if (!options.compare.empty()) return compare(options);
+  if (!(options.seconds >= 1.0 && options.seconds <= 86400.0))
+    throw InputError(fmt::format("--seconds: {} is out of range: must be from 1 to 86400", options.seconds));
+  const sitl::NamedEnvironment environment = sitl::environment(options.env);
+  const sitl::World world = sitl::generate(environment.knobs, sitl::Mission::kPackageDelivery, options.seed);
+  std::string note;
+  const Profile profile = host(default_host_path(), 1.0, note);
+  if (!note.empty()) fmt::print(stderr, "roborun: {}\n", note);
+  RealTimeConfig config;
+  config.mission.costs = profile.costs;
+  config.mission.model = profile.model;
+  config.mission.seed = options.seed;
+  config.seconds = options.seconds;
+  config.best_effort = options.best_effort;
+  config.load = options.load;
+  config.trace = !options.trace.empty();
+  config.inject = injection_of(options.spin);
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  const report::AuditReport result = run_real_time(world, config, [&](double done_s) {
+    if (terminal) fmt::print(stderr, "\raudit {:3.0f} of {:.0f} s   ", done_s, options.seconds);
+  });
+  if (terminal) fmt::print(stderr, "\r{:40}\r", "");
+  for (const std::string& why : result.missing) fmt::print(stderr, "roborun: not real time: {}\n", why);
+  if (options.json)
+    fmt::print("{}\n", report::to_json(result));
+  else
+    fmt::print("{}", report::audit_table(result));
+  std::string error;
+  if (!options.html.empty()) error = report::write_file(options.html, report::audit_html(result));
+  if (error.empty() && !options.trace.empty())
+    error = report::write_file(options.trace, report::perfetto_trace(result));
+  if (!error.empty()) throw InputError(error);
+  const bool clean = result.heap_calls_after_start == 0 && report::minor_faults(result) == 0 &&
+                     report::major_faults(result) == 0 && result.stopped_by.empty();
+  return clean ? 0 : 1;
+}
+
+}  // namespace
+
+void add_audit_command(CLI::App& app, std::function<int()>& run) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "audit", "Fly in real time on simulated sensors, and report time and memory, slot by slot");
+  command->footer(
+      "Examples:\n"
+      "  roborun audit                                  60 s, a table\n"
+      "  roborun audit --seconds 600 --load --html audit.html --trace audit.json\n"
+      "  roborun audit --json > today.json; roborun audit --compare yesterday.json today.json\n\n"
+      "Exit code: 0 no heap call and no page fault in the real-time lanes (with --compare: no regression), 1 "
+      "there "
+      "was one, 2 bad input, or no real time to be had here.");
+  command->add_option("--seconds", options->seconds, "How long, 1 .. 86400")->capture_default_str();
+  command->add_option("--env", options->env, "Environment to fly in: 1 .. 27, or a name")
+      ->capture_default_str();
+  command->add_option("--seed", options->seed, "Seed of world, noise, wind and planner")
+      ->capture_default_str();
+  command->add_flag("--load", options->load, "With stress-ng on all CPUs meanwhile");
+  command->add_flag("--best-effort", options->best_effort,
+                    "Where real time is not to be had, run on without, and say so in the report");
+  command->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
+  command->add_option("--html", options->html, "Write the report as one HTML file with plots");
+  command->add_option("--trace", options->trace,
+                      "Write every slot of every frame for Perfetto (ui.perfetto.dev)");
+  command->add_option("--compare", options->compare, "Two JSON files, before and after: what became worse")
+      ->expected(2);
+  command
+      ->add_option("--tolerance", options->tolerance_ratio,
+                   "With --compare: worse is more than so many times")
+      ->capture_default_str();
+  command->add_option(
+      "--inject-spin", options->spin,
+      "A fault: SLOT:MILLISECONDS, busy in that slot in every frame from its lane's 400th on");
+  command->callback([options, &run] { run = [options] { return audit(*options); }; });
+}
+
+}  // namespace roborun::app

@@ -1,0 +1,379 @@
+#include "platform/app/can_command.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "firmware_if/dronecan/node.hpp"
+#include "platform/can/candump.hpp"
+#include "platform/can/message_json.hpp"
+#include "platform/can/socket_can.hpp"
+#include "platform/sitl/world/input_error.hpp"
+
+namespace roborun::app {
+namespace {
+
+namespace dc = firmware_if::dronecan;
+using Json = nlohmann::ordered_json;
+
+/// Calls visit(line, number) for each line of a file, or of standard input if `path` is empty or "-".
+template <typename Visit>
+void for_each_line(const std::string& path, Visit&& visit) {
+  std::ifstream file;
+  const bool standard_input = path.empty() || path == "-";
+  if (!standard_input) {
+    file.open(path);
+    if (!file) throw sitl::InputError(fmt::format("{}: cannot be opened", path));
+  }
+  std::istream& in = standard_input ? std::cin : file;
+  std::string line;
+  for (std::size_t number = 1; std::getline(in, line); ++number) visit(line, number);
+}
+
+const char* kind_name(dc::TransferKind kind) {
+  if (kind == dc::TransferKind::kMessage) return "message";
+  return kind == dc::TransferKind::kRequest ? "request" : "response";
+}
+
+/// One bus of a log: what its nodes are saying.
+struct ListeningPost {
+  // Every type of every node at once.
+  std::vector<dc::Reassembler::Session> sessions{dc::kAllTypes.size() * dc::kMostNodeId};
+  dc::Reassembler reassembler{dc::kAllTypes, sessions, 0};
+};
+
+class Decoder {
+ public:
+  Decoder(std::string source, bool json) : source_(std::move(source)), json_(json) {}
+
+  void take(const can::LogLine& line, const std::string& where) {
+    auto& post = posts_[line.interface];
+    if (!post) post = std::make_unique<ListeningPost>();
+    dc::Transfer transfer;
+    const dc::FrameVerdict verdict = post->reassembler.receive(line.frame, transfer);
+    switch (verdict) {
+      case dc::FrameVerdict::kAccepted:
+        return;
+      case dc::FrameVerdict::kNotOurs:
+        ++unknown_;
+        return;
+      case dc::FrameVerdict::kDuplicate:
+        ++duplicates_;
+        return;
+      case dc::FrameVerdict::kDelivered:
+        print(line, transfer, where);
+        return;
+      default:
+        complain(line, where, dc::to_string(verdict));
+    }
+  }
+  void not_understood(const std::string& where) {
+    ++lines_not_understood_;
+    fmt::print(stderr, "{}{}: not a line of a candump log\n", source_, where);
+  }
+  void foreign() { ++foreign_; }
+  void summarise() const {
+    std::size_t unfinished = 0;
+    for (const auto& [_, post] : posts_) unfinished += post->reassembler.unfinished();
+    fmt::print(
+        stderr,
+        "{}{} transfers, {} malformed, {} unfinished, {} duplicate frames, {} frames of unknown types, {} "
+        "frames that are not DroneCAN, {} lines not understood\n",
+        source_, transfers_, malformed_, unfinished, duplicates_, unknown_, foreign_, lines_not_understood_);
+  }
+
+ private:
+  void complain(const can::LogLine& line, const std::string& where, const std::string& what) {
+    ++malformed_;
+    fmt::print(stderr, "{}{}: {:08X}: {}\n", source_, where, line.frame.id, what);
+  }
+
+  void print(const can::LogLine& line, const dc::Transfer& transfer, const std::string& where) {
+    const dc::TransferHeader& h = transfer.header;
+    const dc::DataType* type = nullptr;
+    for (const dc::DataType& t : dc::kAllTypes) {
+      if (t.kind == h.kind && t.id == h.data_type_id) type = &t;
+    }
+    Json fields;
+    try {
+      fields = can::to_json(*type, transfer.payload);
+    } catch (const can::MessageError& error) {
+      complain(line, where, error.what());
+      return;
+    }
+    ++transfers_;
+    const double time_s = seconds(transfer.stamp.time_since_epoch());
+    if (!json_) {
+      const std::string to = h.kind == dc::TransferKind::kMessage
+                                 ? "all"
+                                 : fmt::format("{} ({})", h.destination_node_id, kind_name(h.kind));
+      fmt::print("{:.6f} {} {:3} -> {} {} {}\n", time_s, line.interface, h.source_node_id, to, type->name,
+                 fields.dump());
+      return;
+    }
+    Json out;
+    out["type"] = type->name;
+    out["data_type_id"] = h.data_type_id;
+    out["kind"] = kind_name(h.kind);
+    out["source_node_id"] = h.source_node_id;
+    if (h.kind != dc::TransferKind::kMessage) out["destination_node_id"] = h.destination_node_id;
+    out["transfer_id"] = h.transfer_id;
+    out["priority"] = h.priority;
+    out["time_s"] = time_s;
+    out["interface"] = line.interface;
+    out["fields"] = std::move(fields);
+    fmt::print("{}\n", out.dump());
+  }
+
+  std::string source_;
+  bool json_;
+  std::map<std::string, std::unique_ptr<ListeningPost>> posts_;
+  std::size_t transfers_{0};
+  std::size_t malformed_{0};
+  std::size_t duplicates_{0};
+  std::size_t unknown_{0};
+  std::size_t foreign_{0};
+  std::size_t lines_not_understood_{0};
+};
+
+int decode(const std::string& path, bool json) {
+  Decoder decoder("roborun can decode: ", json);
+  for_each_line(path, [&](const std::string& text, std::size_t number) {
+    if (text.find_first_not_of(" \t\r") == std::string::npos) return;
+    const auto line = can::parse_log_line(text);
+    if (!line) {
+      decoder.not_understood(fmt::format("line {}", number));
+    } else if (!line->data_frame) {
+      decoder.foreign();
+    } else {
+      decoder.take(*line, fmt::format("line {}", number));
+    }
+  });
+  decoder.summarise();
+  return 0;
+}
+
+int whole_number(const Json& object, const char* key, int low, int high, std::optional<int> otherwise) {
+  if (!object.contains(key) && otherwise) return *otherwise;
+  const bool good =
+      object.contains(key) && object[key].is_number_integer() && object[key] >= low && object[key] <= high;
+  if (!good) throw can::MessageError(fmt::format("{} must be a whole number from {} to {}", key, low, high));
+  return object[key].get<int>();
+}
+
+void encode_one(const Json& object, std::size_t index) {
+  if (!object.is_object() || !object.contains("type") || !object["type"].is_string())
+    throw can::MessageError("must be an object with type, source_node_id and fields");
+  dc::TransferHeader header;
+  const std::string kind = object.value("kind", "message");
+  if (kind == "request") header.kind = dc::TransferKind::kRequest;
+  if (kind == "response") header.kind = dc::TransferKind::kResponse;
+  if (kind != kind_name(header.kind)) throw can::MessageError("kind must be message, request or response");
+  const auto name = object["type"].get<std::string>();
+  const dc::DataType* type = can::find_type(name, header.kind);
+  if (type == nullptr) throw can::MessageError(fmt::format("type '{}' ({}) is unknown", name, kind));
+  header.data_type_id = type->id;
+  if (object.contains("data_type_id") && object["data_type_id"] != type->id)
+    throw can::MessageError(fmt::format("data_type_id of {} is {}", name, type->id));
+  const bool service = header.kind != dc::TransferKind::kMessage;
+  header.source_node_id = static_cast<std::uint8_t>(whole_number(object, "source_node_id", 0, 127, {}));
+  if (service)
+    header.destination_node_id =
+        static_cast<std::uint8_t>(whole_number(object, "destination_node_id", 1, 127, {}));
+  header.priority = static_cast<std::uint8_t>(whole_number(object, "priority", 0, 31, 16));
+  header.transfer_id = static_cast<std::uint8_t>(whole_number(object, "transfer_id", 0, 31, 0));
+
+  const std::vector<std::uint8_t> payload =
+      can::from_json(*type, object.contains("fields") ? object["fields"] : Json::object());
+  can::LogLine line;
+  line.interface = object.value("interface", "can0");
+  // Without a time of their own, lines are a millisecond apart.
+  const double time_s = object.value("time_s", 1e-3 * static_cast<double>(index));
+  if (!(time_s >= 0.0 && time_s < 4e9)) throw can::MessageError("time_s must be from 0 to 4e9");
+  const MonotonicTime stamp{Nanos{std::llround(time_s * 1e6) * 1000}};
+  std::array<firmware_if::CanFrame, firmware_if::CanBus::kMostFrames> frames;
+  auto count = dc::split(header, type->signature, payload, stamp, frames);
+  if (!count.ok())
+    throw can::MessageError(
+        fmt::format("{} from node {}: an anonymous transfer is a message of type 0 .. 3 of at "
+                    "most 7 bytes",
+                    name, header.source_node_id));
+  for (std::size_t i = 0; i < count.value(); ++i) {
+    line.frame = frames.at(i);
+    fmt::print("{}\n", can::format_log_line(line));
+  }
+}
+
+int encode(const std::string& path) {
+  std::size_t index = 0;
+  for_each_line(path, [&](const std::string& text, std::size_t number) {
+    if (text.find_first_not_of(" \t\r") == std::string::npos) return;
+    try {
+      encode_one(Json::parse(text), index++);
+    } catch (const std::exception& error) {
+      throw sitl::InputError(fmt::format("line {}: {}", number, error.what()));
+    }
+  });
+  return 0;
+}
+
+MonotonicTime now() {
+  return MonotonicTime{
+      std::chrono::duration_cast<Nanos>(std::chrono::steady_clock::now().time_since_epoch())};
+}
+
+void open_or_refuse(can::SocketCan& bus, const std::string& interface) {
+  if (const std::string why = bus.open(interface); !why.empty()) throw sitl::InputError(why);
+}
+
+int monitor(const std::string& interface, bool json, double duration_s) {
+  can::SocketCan bus;
+  open_or_refuse(bus, interface);
+  Decoder decoder("roborun can monitor: ", json);
+  can::LogLine line{.interface = interface, .frame = {}, .data_frame = true};
+  const MonotonicTime end = now() + from_seconds(duration_s);
+  while (now() < end) {
+    const Status status = bus.receive(line.frame);
+    if (status == Status::kOk) {
+      decoder.take(line, fmt::format("{:.6f}", seconds(line.frame.stamp.time_since_epoch())));
+      continue;
+    }
+    (void)std::fflush(stdout);
+    std::this_thread::sleep_for(std::chrono::milliseconds{1});
+    if (status == Status::kIo) (void)bus.reopen();
+  }
+  decoder.summarise();
+  const firmware_if::CanCounters& c = bus.counters();
+  fmt::print(
+      stderr,
+      "{}: {} frames, {} lost in the queue, {} times bus-off, {} error-passive, {} without acknowledge\n",
+      interface, c.received, c.lost_on_receive, c.bus_off, c.error_passive, c.no_acknowledge);
+  return 0;
+}
+
+/// Bench only: one throttle on all ESCs for a while, through the same node and gate that fly; zeros before
+/// and after.
+int send_esc(const std::string& interface, bool props_off, int count, double throttle_ratio,
+             double duration_s) {
+  if (!props_off)
+    throw sitl::InputError("send-esc turns motors: take the propellers off and say so with --props-off");
+  can::SocketCan bus;
+  open_or_refuse(bus, interface);
+  const auto esc_count = static_cast<std::uint8_t>(count);
+  firmware_if::TransmitGate gate({.esc_count = esc_count}, bus);
+  std::vector<dc::Reassembler::Session> sessions(32);
+  dc::Node node({.node_id = 10, .esc_count = esc_count}, gate, bus, sessions);
+  const std::vector<double> thrust(static_cast<std::size_t>(count), throttle_ratio);
+  const auto run_for = [&](double s) {
+    for (const MonotonicTime end = now() + from_seconds(s); now() < end;) {
+      const MonotonicTime t = now();
+      gate.beat(t);
+      (void)node.step(t, {.cycle_ok = true, .armed = true, .thrust_ratio = thrust});
+      std::this_thread::sleep_for(std::chrono::microseconds{2500});
+    }
+  };
+  run_for(0.5);  // disarmed: zeros, so that the ESCs are ready
+  (void)gate.arm();
+  run_for(duration_s);
+  gate.disarm();
+  run_for(0.5);
+  fmt::print("{} commands sent, {} refused\n", node.counters().commands, node.counters().commands_refused);
+  for (int i = 0; i < count; ++i) {
+    const auto& esc = node.inbox().esc.at(static_cast<std::size_t>(i));
+    if (esc.count == 0) {
+      fmt::print("ESC {}: silent\n", i);
+    } else {
+      fmt::print("ESC {}: node {}, {} rpm, {:.1f} V, {:.1f} A, {} errors\n", i, esc.source_node_id,
+                 esc.message.rpm, esc.message.voltage, esc.message.current, esc.message.error_count);
+    }
+  }
+  return node.counters().commands_refused == 0 ? 0 : 1;
+}
+
+struct CanOptions {
+  std::string candump;
+  bool json{false};
+  std::string encode_file;
+  std::string interface;
+  double seconds{1e9};
+  bool props_off{false};
+  int esc_count{4};
+  double throttle_ratio{0.05};
+};
+
+void add_bus_commands(CLI::App& can_app, const std::shared_ptr<CanOptions>& options,
+                      std::function<int()>& run) {
+  CLI::App* monitor_app = can_app.add_subcommand(
+      "monitor", "As decode, live from a SocketCAN interface; counts of errors at the end");
+  monitor_app->add_option("interface", options->interface, "can0")->required();
+  monitor_app->add_flag("--json", options->json, "As of decode");
+  monitor_app->add_option("--seconds", options->seconds, "Stop after so long; default: never")
+      ->check(CLI::Range(0.0, 1e9));
+  monitor_app->callback([options, &run] {
+    run = [options] { return monitor(options->interface, options->json, options->seconds); };
+  });
+
+  CLI::App* esc_app = can_app.add_subcommand(
+      "send-esc",
+      "Bench only, without propellers: one throttle on all ESCs for a while, zeros before and after");
+  esc_app->add_option("interface", options->interface, "can0")->required();
+  esc_app->add_flag("--props-off", options->props_off, "The propellers are off");
+  esc_app->add_option("--count", options->esc_count, "How many ESCs")
+      ->check(CLI::Range(1, 20))
+      ->capture_default_str();
+  esc_app->add_option("--throttle", options->throttle_ratio, "0 .. 0.3 of full throttle")
+      ->check(CLI::Range(0.0, 0.3))
+      ->capture_default_str();
+  esc_app->add_option("--seconds", options->seconds, "How long, 0.1 .. 60")
+      ->required()
+      ->check(CLI::Range(0.1, 60.0));
+  esc_app->callback([options, &run] {
+    run = [options] {
+      return send_esc(options->interface, options->props_off, options->esc_count, options->throttle_ratio,
+                      options->seconds);
+    };
+  });
+}
+
+}  // namespace
+
+void add_can_command(CLI::App& app, std::function<int()>& run) {
+  auto options = std::make_shared<CanOptions>();
+  CLI::App* can_app = app.add_subcommand("can", "DroneCAN tools: decode, encode, monitor, try ESCs");
+  can_app->require_subcommand(1);
+
+  CLI::App* decode_app =
+      can_app->add_subcommand("decode",
+                              "candump log lines in, one line a transfer out. What is malformed is named on "
+                              "standard error, with a count "
+                              "of everything at the end; it does not change the exit code");
+  decode_app->add_option("--candump", options->candump,
+                         "Log of `candump -L` or `candump -l`; default: standard input");
+  decode_app->add_flag(
+      "--json", options->json,
+      "One JSON object a transfer: type, data_type_id, kind, source_node_id, transfer_id, priority, "
+      "time_s, interface, fields (a Timestamp `x` is `x_usec` in microseconds)");
+  decode_app->callback(
+      [options, &run] { run = [options] { return decode(options->candump, options->json); }; });
+
+  CLI::App* encode_app = can_app->add_subcommand(
+      "encode",
+      "JSON in, one object a line as `roborun can decode --json` writes them (type, source_node_id and "
+      "fields are "
+      "needed; priority 16, transfer_id 0); candump log lines out, for canplayer or `roborun can decode`");
+  encode_app->add_option("--json", options->encode_file, "File to read; default: standard input")
+      ->expected(0, 1);
+  encode_app->callback([options, &run] { run = [options] { return encode(options->encode_file); }; });
+  add_bus_commands(*can_app, options, run);
+}
+
+}  // namespace roborun::app

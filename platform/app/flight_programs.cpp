@@ -1,0 +1,103 @@
+#include "platform/app/flight_programs.hpp"
+
+#include "core/random/counter_rng.hpp"
+
+namespace roborun::app {
+
+using core::SlotId;
+
+void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
+  const MonotonicTime now = lane.release();
+  switch (slot) {
+    case SlotId::kWorld:
+      aircraft_.fly_to(now);
+      return;
+    case SlotId::kSense:
+      flight_.sense(aircraft_.sensors, aircraft_.sensors, aircraft_.sensors);
+      return;
+    case SlotId::kCommit:
+      if (mail_.offer.take()) {
+        const Offer& offer = mail_.offer.read();
+        if (offer.is_stop || !lane.reactions().braking())
+          flight_.offer(offer.trajectory);
+        else
+          ++offers_refused_;
+      }
+      flight_.commit(now);
+      return;
+    case SlotId::kTrack:
+      flight_.track(now, aircraft_.actuators);
+      aircraft_.actuators.step(now);
+      return;
+    case SlotId::kPublish: {
+      FlightReport& report = mail_.report.draft();
+      report.estimator = flight_.estimator();
+      report.committed = flight_.committed();
+      report.airborne = flight_.airborne();
+      mail_.report.publish();
+      return;
+    }
+    default:
+      return;
+  }
+}
+
+void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
+  (void)mail_.report.take();
+  const FlightReport& report = mail_.report.read();
+  stages::EstimatedState state;
+  if (given_up_.load(std::memory_order_acquire) || !report.airborne ||
+      report.estimator.state(state) != Status::kOk) {
+    lane.end_frame();
+    return;
+  }
+  frames_.clear();
+  for (firmware_if::DepthCamera* camera : cameras_) {
+    stages::PosedDepthFrame posed;
+    Pose X_WB;
+    if (camera->read(posed.frame) != Status::kOk ||
+        report.estimator.pose_at(posed.frame.stamp, X_WB) != Status::kOk)
+      continue;
+    const firmware_if::CameraMount& mount = camera->mount();
+    Matrix3 R_BC;
+    Vector3 p_BC;
+    for (int i = 0; i < 9; ++i) R_BC(i / 3, i % 3) = mount.R_BC[static_cast<std::size_t>(i)];
+    for (int i = 0; i < 3; ++i) p_BC[i] = mount.p_BC_m[static_cast<std::size_t>(i)];
+    posed.X_WC = {X_WB.R_RT * R_BC, X_WB * p_BC};
+    (void)frames_.push_back(posed);
+  }
+  if (frames_.empty()) {
+    lane.set_period(4 * core::kMinorFrame);
+    lane.end_frame();
+    return;
+  }
+  in_.now = lane.release();
+  in_.frames = {frames_.begin(), frames_.size()};
+  in_.committed = &report.committed;
+  in_.p_WB = state.p_WB;
+  in_.v_WB = state.v_WB;
+  in_.goal_W = config_.goal_W;
+  in_.seed = core::mix64(config_.seed * 1000003ULL + ++decisions_);
+}
+
+void DecisionProgram::hand_over(const core::LaneExecutive& lane) noexcept {
+  if (out_.kind == DecisionKind::kKeep) return;
+  // Too late for its own start: the vehicle already flies its braking tail, and the result is of no use.
+  if (out_.kind == DecisionKind::kNew && out_.trajectory.start_time < lane.now()) {
+    ++too_late_;
+    return;
+  }
+  mail_.offer.draft() = {out_.trajectory, out_.kind == DecisionKind::kBrake};
+  mail_.offer.publish();
+}
+
+void DecisionProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
+  if (slot == SlotId::kGather) return gather(lane);
+  if (slot == SlotId::kHandOver) return hand_over(lane);
+  const auto stage =
+      static_cast<core::StageId>(static_cast<int>(slot) - static_cast<int>(SlotId::kPointCloud));
+  pipeline_.run(stage, in_, out_);
+  if (slot == SlotId::kGovernor) lane.set_period(out_.decision.point.deadline);
+}
+
+}  // namespace roborun::app

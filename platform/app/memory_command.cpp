@@ -1,0 +1,80 @@
+#include "platform/app/memory_command.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "platform/app/board_profile.hpp"
+#include "platform/app/real_time_run.hpp"
+#include "platform/sitl/world/generator.hpp"
+
+namespace roborun::app {
+namespace {
+
+struct Options {
+  std::string env{"14"};
+  double fly_s{0.0};
+  bool json{false};
+};
+
+int memory(const Options& options) {
+  const sitl::World world =
+      sitl::generate(sitl::environment(options.env).knobs, sitl::Mission::kPackageDelivery, 1);
+  const Profile profile = paper();
+  MissionConfig config;
+  config.costs = profile.costs;
+  config.model = profile.model;
+  // Lockstep: what a mission uses does not depend on how fast it is simulated.
+  std::vector<report::PoolUse> pools;
+  if (options.fly_s > 0.0) {
+    config.time_limit_s = options.fly_s;
+    pools = fly_mission(world, config, {}).pools;
+  } else {
+    pools = memory_plan_of(world, config);
+  }
+  std::size_t total = 0;
+  for (const report::PoolUse& p : pools) total += p.element_bytes * p.count;
+  if (options.json) {
+    nlohmann::ordered_json j = {{"bytes", total}, {"pools", nlohmann::ordered_json::array()}};
+    for (const report::PoolUse& p : pools)
+      j["pools"].push_back({{"name", p.name},
+                            {"element_bytes", p.element_bytes},
+                            {"count", p.count},
+                            {"bytes", p.element_bytes * p.count},
+                            {"high_water", p.tells_use ? nlohmann::ordered_json(p.high_water) : nullptr}});
+    fmt::print("{}\n", j.dump());
+    return 0;
+  }
+  fmt::print("{:<24} {:>10} {:>10} {:>12} {:>12} {:>6}\n", "pool", "bytes each", "count", "bytes",
+             "high water", "used");
+  for (const report::PoolUse& p : pools) {
+    const bool known = p.tells_use && p.count > 0;
+    fmt::print("{:<24} {:>10} {:>10} {:>12} {:>12} {:>6}\n", p.name, p.element_bytes, p.count,
+               p.element_bytes * p.count, known ? fmt::format("{}", p.high_water) : "-",
+               known ? fmt::format("{:.0f}%",
+                                   100.0 * static_cast<double>(p.high_water) / static_cast<double>(p.count))
+                     : "-");
+  }
+  fmt::print("{:<24} {:>10} {:>10} {:>12}   {:.1f} MiB\n", "all", "", "", total,
+             static_cast<double>(total) / 1048576.0);
+  return 0;
+}
+
+}  // namespace
+
+void add_memory_command(CLI::App& app, std::function<int()>& run) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("memory", "The memory plan: every pool's size, count, bytes and high-water mark");
+  command->footer(
+      "Examples:\n  roborun memory\n  roborun memory --fly 300    high-water marks of 300 s of flight in "
+      "lockstep");
+  command->add_option("--env", options->env, "Environment: 1 .. 27, or a name")->capture_default_str();
+  command->add_option("--fly", options->fly_s, "Fly for so many virtual seconds first");
+  command->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
+  command->callback([options, &run] { run = [options] { return memory(*options); }; });
+}
+
+}  // namespace roborun::app

@@ -1,0 +1,45 @@
+/// The flight system under the real clock: three pinned threads, locked memory, a sealed heap, simulated
+/// sensors.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "core/executive/frame_table.hpp"
+#include "platform/app/mission.hpp"
+#include "platform/report/audit_report.hpp"
+#include "platform/rt/heap_seal.hpp"
+
+namespace roborun::app {
+
+/// A fault put in on purpose, for tests and demonstrations.
+struct Injection {
+  core::SlotId slot{};
+  Nanos spin{};                ///< Busy for so long each time.
+  std::uint64_t from_frame{};  ///< Of its lane, counted from the first.
+  std::uint64_t frames{};      ///< So many frames.
+  bool heap_call{false};       ///< And one malloc and free.
+};
+
+struct RealTimeConfig {
+  MissionConfig mission{};
+  double seconds{60.0};
+  bool best_effort{false};  ///< Run without what is missing, and say so in the report.
+  rt::HeapSeal seal{rt::HeapSeal::kCount};
+  bool load{false};  ///< stress-ng on all CPUs meanwhile.
+  bool trace{false};
+  std::optional<Injection> inject{};
+};
+
+/// Takes off in `world` and flies on towards its goal for so many seconds, hovering once it is there. Throws
+/// sitl::InputError if this machine cannot run it in real time (one line that names all that is missing) and
+/// best_effort is off, if stress-ng is wanted and not there, and as fly_mission(). `progress` (may be empty)
+/// is called about once a second with the seconds done.
+[[nodiscard]] report::AuditReport run_real_time(const sitl::World& world, const RealTimeConfig& config,
+                                                const std::function<void(double)>& progress);
+
+/// The pools of the flight system for a world, without a flight.
+[[nodiscard]] std::vector<report::PoolUse> memory_plan_of(const sitl::World& world,
+                                                          const MissionConfig& config);
+
+}  // namespace roborun::app

@@ -1,0 +1,30 @@
+/// CLOCK_MONOTONIC, counted from the start of the run.
+#pragma once
+
+#include <time.h>
+
+#include "firmware_if/clock.hpp"
+
+namespace roborun::rt {
+
+/// RT-safe: no system call on Linux (vDSO). Never set back: the wall clock has no part in it.
+class MonotonicClock final : public firmware_if::Clock {
+ public:
+  MonotonicClock() noexcept : epoch_(raw()) {}
+  [[nodiscard]] MonotonicTime now() const noexcept override { return MonotonicTime{raw() - epoch_}; }
+  /// For system calls that take an absolute CLOCK_MONOTONIC time.
+  [[nodiscard]] timespec raw_time(MonotonicTime time) const noexcept {
+    const std::int64_t ns = (time.time_since_epoch() + epoch_).count();
+    return {static_cast<time_t>(ns / 1'000'000'000), static_cast<long>(ns % 1'000'000'000)};
+  }
+
+ private:
+  [[nodiscard]] static Nanos raw() noexcept {
+    timespec t{};
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return Nanos{static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec};
+  }
+  Nanos epoch_;
+};
+
+}  // namespace roborun::rt

@@ -1,0 +1,567 @@
+// Eight lanes are all there is to do: wider registers were slower than AVX2.
+#define HWY_DISABLED_TARGETS (HWY_AVX3 | HWY_AVX3_DL)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE \
+  "stages/perception/block_sight.cpp"  // this file is compiled once an instruction set
+#include <hwy/foreach_target.h>
+// After foreach_target.
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/precision.hpp"
+#include "stages/perception/block_sight.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace roborun::stages::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using Floats = hn::CappedTag<float, 8>;
+using Ints = hn::RebindToSigned<Floats>;
+
+constexpr float kNear_m = 1e-3F;  // a block that reaches behind the camera is projected from here on
+
+constexpr double kCore = 0.5;  // of a finest cell, the part that has to be seen past
+
+struct Lanes {
+  alignas(32) float x[8];
+  alignas(32) float y[8];
+  alignas(32) float z[8];
+};
+
+struct Marks {
+  unsigned free{0}, mixed{0}, blocked{0}, outside{0}, covered{0};
+};
+
+struct Rectangles {
+  alignas(32) std::int32_t u0[8];
+  alignas(32) std::int32_t u1[8];
+  alignas(32) std::int32_t v0[8];
+  alignas(32) std::int32_t v1[8];
+  alignas(32) std::int32_t needed[8];
+  alignas(32) std::int32_t nearest[8];
+  alignas(32) std::int32_t corner[4][8];
+  alignas(32) std::int32_t entry[8];
+};
+
+/// The minimum of four entries. Single loads: gather instructions are slow where they are patched against
+/// leaks.
+HWY_INLINE void store_least(const DepthPyramid::Entry* entry, std::int32_t a, std::int32_t b, std::int32_t c,
+                            std::int32_t e, std::int32_t* to) {
+#if HWY_TARGET == HWY_SCALAR
+  std::int16_t least = DepthPyramid::kMaxSteps, not_most = DepthPyramid::kMaxSteps;
+  for (const std::int32_t i : {a, b, c, e}) {
+    least = std::min(least, entry[i].least_steps);
+    not_most = std::min(not_most, entry[i].not_most_steps);
+  }
+  *to = least | (static_cast<std::int32_t>(not_most) << 16U);
+#else
+  const hn::CappedTag<std::int16_t, 2> pair;
+  const auto at = [&](std::int32_t i) { return hn::LoadU(pair, &entry[i].least_steps); };
+  hn::StoreU(hn::Min(hn::Min(at(a), at(b)), hn::Min(at(c), at(e))), pair,
+             reinterpret_cast<std::int16_t*>(to));
+#endif
+}
+
+template <class Mask>
+HWY_INLINE unsigned bits_of(Mask mask) {
+  std::uint8_t bytes[8] = {};
+  (void)hn::StoreMaskBits(Floats(), mask, bytes);
+  return bytes[0];
+}
+
+/// Half the width of a block's image around its centre's tangent: |d/dx y/x| summed over the cube's axes, an
+/// upper bound because the denominator is the nearest depth.
+template <class V>
+HWY_INLINE V half_width(const SightCamera& c, std::size_t row, V tangent, V half_over_near) {
+  const Floats d;
+  V sum = hn::Zero(d);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    sum = hn::Add(sum, hn::Abs(hn::Sub(hn::Set(d, c.R_CW[3 * row + axis]),
+                                       hn::Mul(tangent, hn::Set(d, c.R_CW[axis])))));
+  return hn::Mul(sum, half_over_near);
+}
+
+template <class V>
+HWY_INLINE void store_pixels(V low, V high, float scale, float last, V keep, std::int32_t* first,
+                             std::int32_t* end) {
+  const Floats d;
+  const V limit = hn::Set(d, last);
+  const auto pixel = [&](V tangent) {
+    return hn::ConvertTo(
+        Ints(), hn::And(keep, hn::Min(hn::Max(hn::Mul(tangent, hn::Set(d, scale)), hn::Zero(d)), limit)));
+  };
+  hn::Store(pixel(low), Ints(), first);
+  hn::Store(pixel(high), Ints(), end);
+}
+
+HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Marks& marks) {
+  const Floats d;
+  const Ints di;
+  Rectangles r;
+  const auto set = [&](float value) { return hn::Set(d, value); };
+  unsigned outside = 0, inside = 0, straddling = 0;
+  auto longest = hn::Set(di, 0);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    const auto x = hn::Load(d, at.x + i);
+    const auto y = hn::Load(d, at.y + i);
+    const auto z = hn::Load(d, at.z + i);
+    const auto reach = set(half_m * c.extent);
+    const auto far = hn::Add(x, reach);
+    const auto near = hn::Sub(x, reach);
+    const auto side = hn::Mul(x, set(c.tan_half));
+    const auto left = hn::Sub(side, y), right = hn::Add(side, y);
+    const auto up = hn::Sub(side, z), down = hn::Add(side, z);
+    const auto s0 = set(half_m * c.support[0]), s1 = set(half_m * c.support[1]);
+    const auto s2 = set(half_m * c.support[2]), s3 = set(half_m * c.support[3]);
+    const auto zero = hn::Zero(d);
+    const auto seen =
+        hn::Min(hn::Min(hn::Add(left, s0), hn::Add(right, s1)), hn::Min(hn::Add(up, s2), hn::Add(down, s3)));
+    const auto all =
+        hn::Min(hn::Min(hn::Sub(left, s0), hn::Sub(right, s1)), hn::Min(hn::Sub(up, s2), hn::Sub(down, s3)));
+    const auto is_outside = hn::Or(hn::Le(seen, zero), hn::Le(far, set(kNear_m)));
+    const auto is_straddling = hn::Le(near, set(kNear_m));
+    outside |= bits_of(is_outside) << i;
+    straddling |= bits_of(is_straddling) << i;
+    inside |= bits_of(hn::Ge(all, zero)) << i;
+    const auto skip = hn::Or(is_outside, is_straddling);
+    const auto keep = hn::IfThenZeroElse(skip, hn::BitCast(d, hn::Set(di, -1)));
+    const auto depth = hn::IfThenElse(skip, set(1.0F), x);
+    const auto inverse = hn::Div(set(1.0F), depth);
+    const auto half_over_near = hn::Div(set(half_m), hn::IfThenElse(skip, set(1.0F), near));
+    const auto u = hn::Mul(y, inverse);
+    const auto v = hn::Mul(z, inverse);
+    const auto du = half_width(c, 1, u, half_over_near);
+    const auto dv = half_width(c, 2, v, half_over_near);
+    const auto u_middle = hn::Sub(set(c.tan_half), u);
+    const auto v_middle = hn::Sub(set(c.tan_half), v);
+    store_pixels(hn::Sub(u_middle, du), hn::Add(u_middle, du), c.columns_per_tan, c.last_column, keep,
+                 r.u0 + i, r.u1 + i);
+    store_pixels(hn::Sub(v_middle, dv), hn::Add(v_middle, dv), c.rows_per_tan, c.last_row, keep, r.v0 + i,
+                 r.v1 + i);
+    const auto span = [&](const std::int32_t* first, const std::int32_t* last) {
+      return hn::Sub(hn::Load(di, last + i), hn::Load(di, first + i));
+    };
+    longest = hn::Max(longest, hn::Max(span(r.u0, r.u1), span(r.v0, r.v1)));
+    // What the camera calls empty up to its range is believed up to the range itself: no margin there.
+    const auto margin = hn::Add(set(c.margin_m), hn::Mul(set(c.margin_per_m2), hn::Mul(far, far)));
+    const auto needed = hn::Min(hn::Add(far, margin), hn::Max(far, set(c.range_m)));
+    const auto steps = set(c.pyramid->steps_per_m());
+    const auto most_steps = set(2.0F * static_cast<float>(DepthPyramid::kMaxSteps));
+    hn::Store(hn::Add(hn::ConvertTo(di, hn::Min(hn::Mul(needed, steps), most_steps)), hn::Set(di, 1)), di,
+              r.needed + i);
+    hn::Store(hn::ConvertTo(di, hn::Min(hn::Max(hn::Mul(near, steps), zero), most_steps)), di, r.nearest + i);
+  }
+  const unsigned looked = ~(outside | straddling) & 0xFFU;
+  marks.outside = outside;
+  marks.mixed |= straddling & ~outside;
+  if (looked == 0) return;
+
+  // One level for all eight blocks, so that the result does not depend on how many are done at once.
+  const std::int32_t side = hn::GetLane(hn::MaxOfLanes(di, longest)) + 1;
+  const DepthPyramid::Level& level = c.pyramid->level(DepthPyramid::level_for(side));
+  unsigned sees_past = 0, hidden = 0;
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    const auto first = [&](const std::int32_t* from) {
+      return hn::ShiftRightSame(hn::Load(di, from + i), level.shift);
+    };
+    const auto last = [&](const std::int32_t* to) {
+      const auto past = hn::Add(hn::Load(di, to + i), hn::Set(di, 1 << level.shift));
+      return hn::Sub(hn::ShiftRightSame(past, level.shift), hn::Set(di, level.back));
+    };
+    const auto x0 = first(r.u0), x1 = hn::Max(last(r.u1), x0);
+    const auto width = hn::Set(di, level.width);
+    const auto row0 = first(r.v0), row1 = hn::Max(last(r.v1), row0);
+    const auto y0 = hn::Mul(row0, width), y1 = hn::Mul(row1, width);
+    hn::Store(hn::Add(x0, y0), di, r.corner[0] + i);
+    hn::Store(hn::Add(x1, y0), di, r.corner[1] + i);
+    hn::Store(hn::Add(x0, y1), di, r.corner[2] + i);
+    hn::Store(hn::Add(x1, y1), di, r.corner[3] + i);
+  }
+  for (std::size_t i = 0; i < 8; ++i)
+    store_least(level.entry, r.corner[0][i], r.corner[1][i], r.corner[2][i], r.corner[3][i], r.entry + i);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    const auto entry = hn::Load(di, r.entry + i);
+    const auto least = hn::And(entry, hn::Set(di, 0xFFFF));
+    const auto most = hn::Sub(hn::Set(di, DepthPyramid::kMaxSteps), hn::ShiftRight<16>(entry));
+    const auto bits = [&](auto mask) { return bits_of(hn::RebindMask(d, mask)) << i; };
+    sees_past |= bits(hn::Gt(least, hn::Sub(hn::Load(di, r.needed + i), hn::Set(di, 1))));
+    hidden |= bits(hn::Gt(hn::Add(hn::Load(di, r.nearest + i), hn::Set(di, 1)), most));
+  }
+  sees_past &= looked;
+  hidden &= looked & ~sees_past;
+  marks.free |= sees_past;
+  marks.covered |= sees_past & inside;
+  marks.blocked |= hidden & inside;
+  marks.mixed |= looked & ~sees_past & ~hidden;
+}
+
+struct Combined {
+  unsigned free, mixed;
+  std::array<unsigned, kMaxCameras> outside;
+};
+
+/// Eight blocks, with their positions in the frame of each camera of the set.
+HWY_INLINE void combine(const SightCameras& cameras, unsigned set, int level, const Lanes* at,
+                        Combined& result) {
+  const auto half_m = static_cast<float>((level == 0 ? kCore : 1.0) * 0.5 * cell_size_m(level));
+  Marks marks;
+  for (unsigned rest = set; rest != 0; rest &= rest - 1) {
+    const auto k = static_cast<std::size_t>(__builtin_ctz(rest));
+    see_with(cameras.camera[k], half_m, at[k], marks);
+    result.outside[k] = marks.outside;
+  }
+  // Seen as free by one camera and as hidden by another that sees all of it: they disagree, and always will.
+  const unsigned covered = cameras.complete ? 0xFFU : marks.covered;
+  result.free = marks.free & ~marks.mixed & ~marks.blocked & covered;
+  result.mixed = (marks.mixed | (marks.free & ~covered)) & ~marks.blocked;
+}
+
+/// The cameras of the set that can see some of block i.
+HWY_INLINE std::uint8_t cameras_of(const Combined& combined, unsigned set, unsigned i) {
+  unsigned can_see = 0;
+  for (unsigned rest = set; rest != 0; rest &= rest - 1) {
+    const auto k = static_cast<unsigned>(__builtin_ctz(rest));
+    can_see |= (~(combined.outside[k] >> i) & 1U) << k;
+  }
+  return static_cast<std::uint8_t>(can_see);
+}
+
+HWY_INLINE EightSeen summary(const Combined& combined, unsigned set) {
+  EightSeen seen{static_cast<std::uint8_t>(combined.free), static_cast<std::uint8_t>(combined.mixed), {}};
+  for (unsigned i = 0; i < 8; ++i) seen.cameras[i] = cameras_of(combined, set, i);
+  return seen;
+}
+
+struct Node {
+  std::uint16_t morton;
+  std::uint8_t level;
+  std::uint8_t cameras;
+  std::array<std::array<float, 3>, kMaxCameras> p_C;
+};
+
+HWY_INLINE std::array<float, 3> in_camera(const SightCamera& c, const Vector3& p_W) {
+  const Vector3 offset_W = p_W - c.p_WC;
+  std::array<float, 3> p_C{};
+  for (std::size_t row = 0; row < 3; ++row) {
+    p_C[row] = c.R_CW[3 * row] * static_cast<float>(offset_W.x()) +
+               c.R_CW[3 * row + 1] * static_cast<float>(offset_W.y()) +
+               c.R_CW[3 * row + 2] * static_cast<float>(offset_W.z());
+  }
+  return p_C;
+}
+
+/// The children of a node, in the frame of each camera.
+HWY_INLINE void place_children(const SightCameras& cameras, const Node& node, Lanes* at) {
+  const Floats d;
+  const auto quarter = hn::Set(d, static_cast<float>(0.25 * cell_size_m(node.level)));
+  for (unsigned set = node.cameras; set != 0; set &= set - 1) {
+    const auto k = static_cast<std::size_t>(__builtin_ctz(set));
+    float* const lane[3] = {at[k].x, at[k].y, at[k].z};
+    for (std::size_t row = 0; row < 3; ++row) {
+      const float* const offset = cameras.camera[k].child[row].data();
+      const auto center = hn::Set(d, node.p_C[k][row]);
+      for (std::size_t i = 0; i < 8; i += hn::Lanes(d))
+        hn::Store(hn::Add(center, hn::Mul(quarter, hn::Load(d, offset + i))), d, lane[row] + i);
+    }
+  }
+}
+
+HWY_INLINE Node node_of(const SightCameras& cameras, const SightBlock& block) {
+  Node node{};
+  node.level = static_cast<std::uint8_t>(block.level);
+  node.cameras = block.cameras;
+  for (std::size_t k = 0; k < cameras.count; ++k) node.p_C[k] = in_camera(cameras.camera[k], block.center_W);
+  return node;
+}
+
+EightSeen SeeBlocks(const SightCameras& cameras, int level, const std::array<Vector3, 8>& center_W) {
+  Lanes at[kMaxCameras];
+  for (std::size_t k = 0; k < cameras.count; ++k) {
+    for (std::size_t i = 0; i < 8; ++i) {
+      const std::array<float, 3> p_C = in_camera(cameras.camera[k], center_W[i]);
+      at[k].x[i] = p_C[0];
+      at[k].y[i] = p_C[1];
+      at[k].z[i] = p_C[2];
+    }
+  }
+  const unsigned all = (1U << cameras.count) - 1U;
+  Combined combined;
+  combine(cameras, all, level, at, combined);
+  return summary(combined, all);
+}
+
+EightSeen SeeChildren(const SightCameras& cameras, const SightBlock& parent) {
+  Lanes at[kMaxCameras];
+  const Node node = node_of(cameras, parent);
+  place_children(cameras, node, at);
+  Combined combined;
+  combine(cameras, node.cameras, node.level - 1, at, combined);
+  return summary(combined, node.cameras);
+}
+
+void SeeBrick(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) {
+  // Depth first: at most seven siblings wait on each of four levels.
+  std::array<Node, 29> stack;
+  Lanes at[kMaxCameras];
+  stack[0] = node_of(cameras, brick);
+  std::size_t depth = 1;
+  seen.count = 0;
+  seen.visited = 0;
+  seen.free_cells = 0;
+  Combined combined;
+  while (depth > 0 && seen.visited < BrickSeen::kMaxGroups) {
+    const Node node = stack[--depth];
+    ++seen.visited;
+    place_children(cameras, node, at);
+    const int level = node.level - 1;
+    combine(cameras, node.cameras, level, at, combined);
+    if (combined.free != 0) {
+      seen.group[seen.count++] = {node.morton, static_cast<std::uint8_t>(level),
+                                  static_cast<std::uint8_t>(combined.free)};
+      seen.free_cells += static_cast<std::uint32_t>(__builtin_popcount(combined.free))
+                         << (3U * static_cast<unsigned>(level));
+    }
+    if (level <= finest) continue;
+    for (unsigned mixed = combined.mixed; mixed != 0; mixed &= mixed - 1) {
+      const auto i = static_cast<unsigned>(__builtin_ctz(mixed));
+      Node& child = stack[depth++];
+      child.morton = static_cast<std::uint16_t>(8U * node.morton + i);
+      child.level = static_cast<std::uint8_t>(level);
+      child.cameras = cameras_of(combined, node.cameras, i);
+      for (unsigned rest = child.cameras; rest != 0; rest &= rest - 1) {
+        const auto k = static_cast<std::size_t>(__builtin_ctz(rest));
+        child.p_C[k] = {at[k].x[i], at[k].y[i], at[k].z[i]};
+      }
+    }
+  }
+}
+
+void EndCells(const PixelLine& line, std::span<const float> depth_m, float range_m, SurfaceRow& row) {
+  const Floats d;
+  const Ints di;
+  constexpr float kBias = 4096.0F;  // makes truncation round down
+  constexpr std::int32_t kNone = -1;
+  const std::size_t count = depth_m.size();
+  constexpr std::size_t kPad = SurfaceRow::kPad;
+  alignas(32) std::int32_t cell[3][kPad + DepthPyramid::kMaxPixels + kPad];
+  const auto some = [&](const float* depth, std::size_t u) {
+    const auto z = hn::LoadU(d, depth);
+    auto inside = hn::RebindMask(di, hn::And(hn::Gt(z, hn::Zero(d)), hn::Lt(z, hn::Set(d, range_m))));
+    const auto far = hn::IfThenElseZero(hn::RebindMask(d, inside), z);
+    const auto column = hn::ConvertTo(d, hn::Iota(di, static_cast<std::int32_t>(u)));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto direction =
+          hn::Add(hn::Set(d, line.first[axis]), hn::Mul(column, hn::Set(d, line.step[axis])));
+      const auto cells = hn::Add(hn::Mul(far, direction), hn::Set(d, line.rest[axis] + kBias));
+      const auto c = hn::Add(hn::ConvertTo(di, cells),
+                             hn::Set(di, line.origin[axis] - static_cast<std::int32_t>(kBias)));
+      inside = hn::And(inside, hn::And(hn::Gt(c, hn::Set(di, line.low[axis] - 1)),
+                                       hn::Lt(c, hn::Set(di, line.high[axis] + 1))));
+      hn::Store(c, di, cell[axis] + kPad + u);
+    }
+    hn::Store(hn::IfThenElse(inside, hn::Load(di, cell[0] + kPad + u), hn::Set(di, kNone)), di,
+              cell[0] + kPad + u);
+  };
+  const std::size_t lanes = hn::Lanes(d);
+  std::size_t u = 0;
+  for (; u + lanes <= count; u += lanes) some(depth_m.data() + u, u);
+  if (u < count) {
+    float tail[8] = {};
+    for (std::size_t i = 0; u + i < count; ++i) tail[i] = depth_m[u + i];
+    some(tail, u);
+  }
+  // Keep those that differ from their left neighbour.
+  for (auto& axis : cell) axis[kPad - 1] = kNone;
+  row.count = 0;
+  for (u = 0; u < count; u += lanes) {
+    const auto differs = [&](std::size_t axis) {
+      return hn::Ne(hn::Load(di, cell[axis] + kPad + u), hn::LoadU(di, cell[axis] + kPad + u - 1));
+    };
+    const auto is_new = hn::Or(differs(0), hn::Or(differs(1), differs(2)));
+    const auto keep = hn::And(is_new, hn::Gt(hn::Load(di, cell[0] + kPad + u), hn::Set(di, kNone)));
+    std::size_t kept = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      kept =
+          hn::CompressStore(hn::Load(di, cell[axis] + kPad + u), keep, di, row.cell[axis].data() + row.count);
+    row.count += kept;
+  }
+}
+
+std::size_t DepthSteps(std::span<const float> depth_m, float range_m, float steps_per_m,
+                       DepthPyramid::Entry* entry) {
+  const Floats d;
+  const Ints di;
+  const auto range = hn::Set(d, range_m);
+  const auto all = hn::Set(di, DepthPyramid::kMaxSteps);
+  std::size_t lost = 0;
+  const auto some = [&](const float* depth, std::int32_t* to) {
+    const auto raw = hn::LoadU(d, depth);
+    const auto known = hn::Gt(raw, hn::Zero(d));
+    lost += hn::Lanes(d) - hn::CountTrue(d, known);
+    const auto z = hn::IfThenElseZero(known, raw);
+    const auto within = hn::RebindMask(di, hn::Lt(z, range));
+    const auto steps = hn::ConvertTo(di, hn::Mul(hn::Min(z, range), hn::Set(d, steps_per_m)));
+    const auto least = hn::IfThenElse(within, steps, all);
+    const auto not_most = hn::IfThenElseZero(within, hn::Sub(hn::Sub(all, steps), hn::Set(di, 1)));
+    hn::StoreU(hn::Or(least, hn::ShiftLeft<16>(not_most)), di, to);
+  };
+  auto* to = reinterpret_cast<std::int32_t*>(entry);
+  const std::size_t lanes = hn::Lanes(d);
+  std::size_t i = 0;
+  for (; i + lanes <= depth_m.size(); i += lanes) some(depth_m.data() + i, to + i);
+  if (i < depth_m.size()) {
+    float tail[8];
+    std::int32_t out[8];
+    for (std::size_t k = 0; k < 8; ++k) tail[k] = i + k < depth_m.size() ? depth_m[i + k] : range_m;
+    some(tail, out);
+    for (std::size_t k = 0; i + k < depth_m.size(); ++k) to[i + k] = out[k];
+  }
+  return lost;
+}
+
+void LeastOfFour(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride,
+                 std::size_t count, DepthPyramid::Entry* to) {
+  const auto least = [](DepthPyramid::Entry a, DepthPyramid::Entry b) {
+    return DepthPyramid::Entry{std::min(a.least_steps, b.least_steps),
+                               std::min(a.not_most_steps, b.not_most_steps)};
+  };
+  std::size_t x = 0;
+#if HWY_TARGET != HWY_SCALAR
+  const hn::CappedTag<std::int16_t, 16> d;
+  const std::size_t entries = hn::Lanes(d) / 2;
+  const auto at = [&](const DepthPyramid::Entry* entry) { return hn::LoadU(d, &entry->least_steps); };
+  if (stride == 1) {
+    for (; x + entries <= count; x += entries)
+      hn::StoreU(
+          hn::Min(hn::Min(at(above + x), at(above + x + 1)), hn::Min(at(below + x), at(below + x + 1))), d,
+          &to[x].least_steps);
+  }
+#endif
+  for (; x < count; ++x) {
+    const std::size_t i = stride * x;
+    to[x] = least(least(above[i], above[i + stride]), least(below[i], below[i + stride]));
+  }
+}
+
+std::size_t BrickFlags(const std::int8_t* cell, std::uint8_t* mip) {
+  std::size_t unknown = 0;
+  std::size_t i = 0;
+#if HWY_TARGET != HWY_SCALAR
+  const hn::CappedTag<std::int8_t, 32> d;
+  const hn::Repartition<std::uint64_t, decltype(d)> d64;
+  const auto is_unknown = hn::Set(d, evidence::kUnknown), zero = hn::Zero(d);
+  const auto flag = [&](std::uint8_t value) { return hn::Set(d, static_cast<std::int8_t>(value)); };
+  for (; i < kCellsPerBrick; i += hn::Lanes(d)) {
+    const auto v = hn::LoadU(d, cell + i);
+    const auto unknown_here = hn::Eq(v, is_unknown);
+    unknown += hn::CountTrue(d, unknown_here);
+    const auto known = hn::IfThenElse(hn::Gt(v, zero), flag(content::kOccupied), flag(content::kFree));
+    auto word = hn::BitCast(d64, hn::IfThenElse(unknown_here, flag(content::kUnknown), known));
+    word = hn::Or(word, hn::ShiftRight<32>(word));
+    word = hn::Or(word, hn::ShiftRight<16>(word));
+    word = hn::Or(word, hn::ShiftRight<8>(word));
+    alignas(32) std::uint64_t words[4];
+    hn::Store(word, d64, words);
+    for (std::size_t k = 0; k < hn::Lanes(d64); ++k) mip[i / 8 + k] = static_cast<std::uint8_t>(words[k]);
+  }
+#endif
+  for (; i < kCellsPerBrick; i += 8) {
+    unsigned flags = 0;
+    for (std::size_t k = i; k < i + 8; ++k) {
+      const bool known = cell[k] != evidence::kUnknown;
+      flags |= !known ? content::kUnknown : (cell[k] > 0 ? content::kOccupied : content::kFree);
+      unknown += known ? 0U : 1U;
+    }
+    mip[i / 8] = static_cast<std::uint8_t>(flags);
+  }
+  return kCellsPerBrick - unknown;
+}
+
+}  // namespace roborun::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace roborun::stages {
+
+HWY_EXPORT(SeeBlocks);
+HWY_EXPORT(SeeChildren);
+HWY_EXPORT(SeeBrick);
+HWY_EXPORT(EndCells);
+HWY_EXPORT(DepthSteps);
+HWY_EXPORT(LeastOfFour);
+HWY_EXPORT(BrickFlags);
+
+void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& image,
+                          const Margin& depth_margin) noexcept {
+  const Matrix3 R = posed.X_WC.R_RT.transpose();
+  const auto t = static_cast<double>(posed.frame.tan_half_fov_ratio);
+  p_WC = posed.X_WC.p_RT;
+  const auto sum_abs = [&R, t](double of_x, int row, double of_row) {
+    double sum = 0.0;
+    for (int i = 0; i < 3; ++i) sum += std::fabs(of_x * t * R(0, i) + of_row * R(row, i));
+    return static_cast<float>(sum);
+  };
+  for (int i = 0; i < 9; ++i) R_CW[static_cast<std::size_t>(i)] = static_cast<float>(R(i / 3, i % 3));
+  for (std::size_t i = 0; i < 8; ++i) {
+    const Vector3 offset_W((i & 1U) != 0 ? 1.0 : -1.0, (i & 2U) != 0 ? 1.0 : -1.0,
+                           (i & 4U) != 0 ? 1.0 : -1.0);
+    const Vector3 offset_C = R * offset_W;
+    for (std::size_t row = 0; row < 3; ++row)
+      child[row][i] = static_cast<float>(offset_C[static_cast<Eigen::Index>(row)]);
+  }
+  extent = sum_abs(0.0, 0, 1.0);
+  support = {sum_abs(1.0, 1, -1.0), sum_abs(1.0, 1, 1.0), sum_abs(1.0, 2, -1.0), sum_abs(1.0, 2, 1.0)};
+  tan_half = posed.frame.tan_half_fov_ratio;
+  range_m = posed.frame.range_m;
+  columns_per_tan = static_cast<float>(0.5 * posed.frame.width / t);
+  rows_per_tan = static_cast<float>(0.5 * posed.frame.height / t);
+  last_column = static_cast<float>(posed.frame.width - 1);
+  last_row = static_cast<float>(posed.frame.height - 1);
+  margin_m = static_cast<float>(depth_margin.constant_m);
+  margin_per_m2 = static_cast<float>(depth_margin.per_m2);
+  pyramid = &image;
+}
+
+EightSeen see_blocks(const SightCameras& cameras, int level,
+                     const std::array<Vector3, 8>& center_W) noexcept {
+  return HWY_DYNAMIC_DISPATCH(SeeBlocks)(cameras, level, center_W);
+}
+
+EightSeen see_children(const SightCameras& cameras, const SightBlock& parent) noexcept {
+  return HWY_DYNAMIC_DISPATCH(SeeChildren)(cameras, parent);
+}
+
+void see_brick(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) noexcept {
+  HWY_DYNAMIC_DISPATCH(SeeBrick)(cameras, brick, finest, seen);
+}
+
+void end_cells(const PixelLine& line, std::span<const float> depth_m, float range_m,
+               SurfaceRow& row) noexcept {
+  HWY_DYNAMIC_DISPATCH(EndCells)(line, depth_m, range_m, row);
+}
+
+std::size_t depth_steps(std::span<const float> depth_m, float range_m, float steps_per_m,
+                        DepthPyramid::Entry* entry) noexcept {
+  return HWY_DYNAMIC_DISPATCH(DepthSteps)(depth_m, range_m, steps_per_m, entry);
+}
+
+void least_of_four(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride,
+                   std::size_t count, DepthPyramid::Entry* to) noexcept {
+  HWY_DYNAMIC_DISPATCH(LeastOfFour)(above, below, stride, count, to);
+}
+
+std::size_t brick_flags(const std::array<std::int8_t, kCellsPerBrick>& cell, std::uint8_t* mip) noexcept {
+  return HWY_DYNAMIC_DISPATCH(BrickFlags)(cell.data(), mip);
+}
+
+std::int64_t sight_instruction_sets() noexcept { return hwy::SupportedTargets(); }
+
+void use_sight_instruction_sets(std::int64_t sets) noexcept {
+  hwy::SetSupportedTargetsForTest(sets == ~std::int64_t{0} ? 0 : sets);
+  hwy::GetChosenTarget().DeInit();
+}
+
+}  // namespace roborun::stages
+#endif  // HWY_ONCE

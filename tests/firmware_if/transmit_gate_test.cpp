@@ -1,0 +1,203 @@
+#include "firmware_if/transmit_gate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "tests/firmware_if/recording_bus.hpp"
+#include "tests/support/no_alloc_scope.hpp"
+
+namespace roborun::firmware_if {
+namespace {
+
+using dronecan::EscRawCommand;
+using dronecan::TransferKind;
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+constexpr MonotonicTime at(Nanos t) { return MonotonicTime{t}; }
+
+EscRawCommand throttles(std::initializer_list<std::int16_t> values) {
+  EscRawCommand command;
+  for (const std::int16_t v : values) EXPECT_TRUE(command.cmd.push_back(v));
+  return command;
+}
+
+struct Rig {
+  test::RecordingBus bus;
+  TransmitGate sut{{}, bus};
+  MonotonicTime now{milliseconds{1000}};
+
+  Rig() { sut.set_node_id(10); }
+  /// Sends one command after another 2.5 ms and returns what left.
+  EscRawCommand command(std::initializer_list<std::int16_t> values, bool beat = true) {
+    now += microseconds{2500};
+    if (beat) sut.beat(now);
+    EXPECT_EQ(sut.send(throttles(values), now), Status::kOk);
+    EscRawCommand out;
+    const CanFrame& frame = bus.sent.back();
+    EXPECT_EQ(dronecan::decode(frame.bytes().first(frame.size - 1U), out), Status::kOk);
+    return out;
+  }
+};
+
+// Every (kind, type id, priority, has a destination), with and without a node id: exactly the list passes.
+TEST(TransmitGate, PassesExactlyItsListOfAll65536TypeIds) {
+  std::uint64_t tried = 0;
+  std::set<std::tuple<bool, TransferKind, std::uint16_t, std::uint8_t, bool>> passed;
+  for (const bool with_id : {false, true}) {
+    test::RecordingBus bus;
+    TransmitGate sut({}, bus);
+    sut.set_node_id(with_id ? 10 : 0);
+    MonotonicTime now{};
+    for (const TransferKind kind :
+         {TransferKind::kMessage, TransferKind::kRequest, TransferKind::kResponse}) {
+      for (unsigned type = 0; type <= 0xffff; ++type) {
+        for (std::uint8_t priority = 0; priority < 32; ++priority) {
+          for (const bool destination : {false, true}) {
+            now += std::chrono::seconds{1};  // no rate limit is in the way
+            bus.sent.clear();
+            // A payload of the right form for what is listed: seven bytes are four throttles or a NodeStatus.
+            std::array<std::uint8_t, 7> bytes{};
+            bytes[1] = 1;  // a hardpoint that holds
+            std::size_t size = 7;
+            if (type == 1070) size = 3;
+            if (type == 1100) size = 1;
+            const dronecan::TransferHeader header{kind,     static_cast<std::uint16_t>(type),
+                                                  0,        static_cast<std::uint8_t>(destination ? 42 : 0),
+                                                  priority, 0};
+            const Status status = sut.send(header, std::span<const std::uint8_t>(bytes).first(size), now);
+            ++tried;
+            if (status == Status::kOk) {
+              ASSERT_EQ(bus.sent.size(), 1U);
+              passed.insert({with_id, kind, static_cast<std::uint16_t>(type), priority, destination});
+            } else {
+              ASSERT_TRUE(bus.sent.empty());
+            }
+          }
+        }
+      }
+    }
+  }
+  EXPECT_EQ(tried, 2U * 3U * 65536U * 32U * 2U);
+  const std::set<std::tuple<bool, TransferKind, std::uint16_t, std::uint8_t, bool>> wanted{
+      {true, TransferKind::kMessage, 1030, 4, false},  {true, TransferKind::kMessage, 1100, 16, false},
+      {true, TransferKind::kMessage, 1070, 16, false}, {true, TransferKind::kMessage, 1081, 24, false},
+      {true, TransferKind::kMessage, 341, 24, false},  {true, TransferKind::kResponse, 1, 24, true},
+      {false, TransferKind::kMessage, 1, 30, false}};
+  EXPECT_EQ(passed, wanted);
+}
+
+TEST(TransmitGate, SendsZerosUnlessArmedAliveAndNotKilled) {
+  Rig rig;
+  EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 0);  // disarmed
+  ASSERT_EQ(rig.sut.arm(), Status::kOk);
+  EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 100);
+  rig.now += milliseconds{6};  // with the 2.5 ms of the call: 8.5 ms since the last beat
+  EXPECT_EQ(rig.command({100, 100, 100, 100}, false).cmd.items[0], 0);
+  EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 100);
+  rig.sut.kill();
+  EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 0);
+  EXPECT_EQ(rig.sut.arm(), Status::kInvalidArgument);
+  EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 0);
+  rig.sut.reset_kill();
+  EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 0);  // a released switch does not re-arm
+  ASSERT_EQ(rig.sut.arm(), Status::kOk);
+  EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 100);
+  rig.sut.disarm();
+  EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 0);
+  EXPECT_EQ(rig.sut.counters().zeroed, 6U * 4U);
+}
+
+TEST(TransmitGate, RefusesABeatFromTheFuture) {
+  Rig rig;
+  ASSERT_EQ(rig.sut.arm(), Status::kOk);
+  rig.sut.beat(rig.now + milliseconds{100});
+  EXPECT_FALSE(rig.sut.live(rig.now));
+  EXPECT_TRUE(rig.sut.live(rig.now + milliseconds{100}));
+  EXPECT_TRUE(rig.sut.live(rig.now + microseconds{107'500}));
+  EXPECT_FALSE(rig.sut.live(rig.now + microseconds{107'501}));
+}
+
+TEST(TransmitGate, ClampsToForwardAndLimitsTheRiseOnly) {
+  Rig rig;
+  ASSERT_EQ(rig.sut.arm(), Status::kOk);
+  (void)rig.command({0, 0, 0, 0});
+  // 2.5 ms of 8191 * 40 per second: 819.
+  EscRawCommand out = rig.command({8191, 500, -500, 819});
+  EXPECT_EQ(out.cmd.items[0], 819);
+  EXPECT_EQ(out.cmd.items[1], 500);
+  EXPECT_EQ(out.cmd.items[2], 0);
+  EXPECT_EQ(out.cmd.items[3], 819);
+  for (int i = 0; i < 20; ++i) out = rig.command({8191, 8191, 8191, 8191});
+  EXPECT_EQ(out.cmd.items[0], 8191);
+  out = rig.command({0, 1, 8000, 8191});
+  EXPECT_EQ(out.cmd.items[0], 0);
+  EXPECT_EQ(out.cmd.items[1], 1);
+  EXPECT_EQ(out.cmd.items[2], 8000);
+  rig.now += milliseconds{500};  // a pause earns no more than 10 ms of rise
+  out = rig.command({8191, 0, 0, 0});
+  EXPECT_EQ(out.cmd.items[0], 3276);
+}
+
+TEST(TransmitGate, RefusesAnyOtherNumberOfThrottles) {
+  Rig rig;
+  for (std::size_t n = 0; n <= 20; ++n) {
+    EscRawCommand command;
+    for (std::size_t i = 0; i < n; ++i) ASSERT_TRUE(command.cmd.push_back(1));
+    rig.now += milliseconds{10};
+    EXPECT_EQ(rig.sut.send(command, rig.now) == Status::kOk, n == 4) << n;
+  }
+  EXPECT_EQ(rig.bus.sent.size(), 1U);
+}
+
+TEST(TransmitGate, KeepsTheRateAndCountsTransferIds) {
+  Rig rig;
+  unsigned sent = 0;
+  for (int us = 0; us < 100'000; us += 500) {
+    const Status status = rig.sut.send(throttles({0, 0, 0, 0}), at(microseconds{us}));
+    if (status == Status::kOk) {
+      EXPECT_EQ(rig.bus.sent.back().data[7] & 0x1fU, sent % 32);
+      ++sent;
+    } else {
+      EXPECT_EQ(status, Status::kNotReady);
+    }
+  }
+  EXPECT_EQ(sent, 50U);  // every 2 ms
+  EXPECT_EQ(rig.sut.counters().too_soon, 150U);
+}
+
+TEST(TransmitGate, SpendsTheTransferIdWhenTheBusRefuses) {
+  Rig rig;
+  rig.bus.answer = Status::kNotReady;
+  EXPECT_EQ(rig.sut.send(throttles({0, 0, 0, 0}), at(milliseconds{0})), Status::kNotReady);
+  rig.bus.answer = Status::kOk;
+  EXPECT_EQ(rig.sut.send(throttles({0, 0, 0, 0}), at(milliseconds{10})), Status::kOk);
+  EXPECT_EQ(rig.bus.sent.back().data[7] & 0x1fU, 1U);
+  EXPECT_EQ(rig.sut.counters().no_room, 1U);
+}
+
+TEST(TransmitGate, HoldsThePackageUntilReleaseIsAllowed) {
+  Rig rig;
+  const dronecan::HardpointCommand release{.hardpoint_id = 1, .command = 0};
+  const dronecan::HardpointCommand hold{.hardpoint_id = 1, .command = 1};
+  EXPECT_EQ(rig.sut.send(release, at(milliseconds{0})), Status::kInvalidArgument);
+  EXPECT_EQ(rig.sut.send(hold, at(milliseconds{100})), Status::kOk);
+  rig.sut.allow_release(true);
+  EXPECT_EQ(rig.sut.send(release, at(milliseconds{200})), Status::kOk);
+  EXPECT_EQ(rig.bus.sent.size(), 2U);
+}
+
+TEST(TransmitGate, DoesNotAllocate) {
+  Rig rig;
+  rig.bus.sent.reserve(8);
+  const EscRawCommand command = throttles({1, 2, 3, 4});
+  const test::NoAllocScope scope;
+  EXPECT_EQ(rig.sut.send(command, rig.now), Status::kOk);
+  EXPECT_EQ(rig.sut.send(dronecan::NodeStatus{}, rig.now), Status::kOk);
+  EXPECT_EQ(scope.count(), 0U);
+}
+
+}  // namespace
+}  // namespace roborun::firmware_if

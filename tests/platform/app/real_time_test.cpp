@@ -1,0 +1,103 @@
+/// Whole real-time flights of a few seconds, sound and with faults. No wall time is judged: a shared machine
+/// may be late, but it may not call the heap, fault a page in, or let one lane's fault take another one's
+/// frames.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "platform/app/board_profile.hpp"
+#include "platform/app/real_time_run.hpp"
+#include "platform/sitl/world/world_file.hpp"
+
+namespace roborun::app {
+namespace {
+
+class RealTimeRun : public ::testing::Test {
+ protected:
+  RealTimeRun() : world(sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {})) {
+    // A fast board, so that the governor grants what this machine easily holds.
+    config.mission.costs = paper().costs;
+    for (core::StageCost& c : config.mission.costs.stage) c = {};
+    config.mission.model = paper().model;
+    for (governor::LatencyModel& m : config.mission.model) m = {};
+    config.best_effort = true;
+  }
+  static const report::AuditLane& lane(const report::AuditReport& r, core::LaneId id) {
+    return r.lanes[static_cast<std::size_t>(id)];
+  }
+  static const report::AuditSlot& slot(const report::AuditReport& r, core::SlotId id) {
+    return r.slots[static_cast<std::size_t>(id)];
+  }
+  sitl::World world;
+  RealTimeConfig config;
+};
+
+TEST_F(RealTimeRun, FliesWithoutAHeapCallOrAPageFault) {
+  config.seconds = 9.0;
+  config.trace = true;
+  const report::AuditReport r = run_real_time(world, config, {});
+  EXPECT_GT(r.decisions, 0U) << "it never got as far as a decision: nothing was tested";
+  EXPECT_GT(lane(r, core::LaneId::kFlight).frames, 1000U);
+  EXPECT_GT(slot(r, core::SlotId::kPlanner).time.count, 0U);
+  EXPECT_GT(r.trace.size(), 1000U);
+  EXPECT_EQ(r.stopped_by, "");
+  EXPECT_EQ(r.heap_calls_after_start, 0U);
+  const bool locked = std::none_of(r.missing.begin(), r.missing.end(),
+                                   [](const std::string& why) { return why.rfind("memory lock", 0) == 0; });
+  if (!locked) GTEST_SKIP() << "page faults are not judged: " << r.missing.front();
+  EXPECT_EQ(report::minor_faults(r), 0U);
+  EXPECT_EQ(report::major_faults(r), 0U);
+  EXPECT_LE(r.locked_bytes, 64U << 20U);
+  for (const report::PoolUse& p : r.pools) EXPECT_LE(p.high_water, p.count) << p.name;
+}
+
+TEST_F(RealTimeRun, AStageThatSpinsInTheDecisionLaneTakesNoFrameFromTheFlightLane) {
+  config.seconds = 4.0;
+  // The gather slot runs from the first frame on: 2 s without giving its CPU away.
+  config.inject = Injection{core::SlotId::kGather, Nanos{2'000'000'000}, 100, 1, false};
+  const report::AuditReport r = run_real_time(world, config, {});
+  const report::AuditLane& decision = lane(r, core::LaneId::kDecision);
+  ASSERT_GE(decision.response.max_us, 2e6) << "the fault was not there";
+  EXPECT_GE(decision.slips, 700U);
+  EXPECT_EQ(slot(r, core::SlotId::kGather).overruns, 1U) << "blamed";
+  for (const report::AuditSlot& s : r.slots) {
+    if (s.lane != "decision") continue;
+    EXPECT_EQ(s.overruns, s.name == "gather" ? 1U : 0U) << s.name;
+  }
+  const report::AuditLane& flight = lane(r, core::LaneId::kFlight);
+  EXPECT_GT(flight.frames, 1000U) << "of 1,600; 800 fell into the fault";
+}
+
+TEST_F(RealTimeRun, NoCatchUpAfterAStallInTheFlightLane) {
+  config.seconds = 2.0;
+  config.inject = Injection{core::SlotId::kTrack, Nanos{100'000'000}, 100, 1, false};
+  const report::AuditReport r = run_real_time(world, config, {});
+  const report::AuditLane& flight = lane(r, core::LaneId::kFlight);
+  EXPECT_GE(flight.slips, 39U);
+  EXPECT_LE(flight.frames + flight.slips, 820U) << "frames were made up for";
+  EXPECT_GE(slot(r, core::SlotId::kTrack).overruns, 1U);
+  EXPECT_LT(slot(r, core::SlotId::kTrack).margin_ratio, 0.0);
+  EXPECT_EQ(r.stopped_by, "") << "one overrun is not four hundred";
+}
+
+TEST_F(RealTimeRun, ATrackerThatIsAlwaysLateStopsTheRun) {
+  config.seconds = 30.0;
+  config.inject = Injection{core::SlotId::kTrack, Nanos{3'000'000}, 10, UINT64_MAX, false};
+  const report::AuditReport r = run_real_time(world, config, {});
+  EXPECT_EQ(r.stopped_by, "track");
+  EXPECT_LT(r.seconds, 29.0);
+}
+
+TEST_F(RealTimeRun, CountsAndNamesAHeapCallAfterStart) {
+  if (!rt::heap_seal_works()) GTEST_SKIP() << "the sanitizer owns the heap";
+  config.seconds = 1.0;
+  config.inject = Injection{core::SlotId::kSense, Nanos{0}, 50, 3, true};
+  const report::AuditReport r = run_real_time(world, config, {});
+  EXPECT_EQ(r.heap_calls_after_start, 6U) << "three times malloc and free";
+  std::uint64_t named = 0;
+  for (const auto& [name, count] : r.heap_sites) named += count;
+  EXPECT_EQ(named, 6U);
+}
+
+}  // namespace
+}  // namespace roborun::app

@@ -1,0 +1,151 @@
+// The vector kernels of the map: the same bits on every instruction set, and bounds that are bounds.
+#include "stages/perception/block_sight.hpp"
+
+#include <gtest/gtest.h>
+
+#include "core/random/counter_rng.hpp"
+#include "stages/perception/brick_map.hpp"
+#include "tests/stages/perception/scene.hpp"
+
+namespace roborun::stages {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Matrix3 tilted() {
+  return (Eigen::AngleAxisd(0.3, Vector3::UnitZ()) * Eigen::AngleAxisd(0.1, Vector3::UnitY()) *
+          Eigen::AngleAxisd(-0.07, Vector3::UnitX()))
+      .toRotationMatrix();
+}
+
+/// Restores the choice of the machine.
+struct InstructionSet {
+  explicit InstructionSet(std::int64_t set) { use_sight_instruction_sets(set); }
+  ~InstructionSet() { use_sight_instruction_sets(~std::int64_t{0}); }
+  InstructionSet(const InstructionSet&) = delete;
+  InstructionSet& operator=(const InstructionSet&) = delete;
+};
+
+class BlockSight : public ::testing::Test {
+ protected:
+  BlockSight() {
+    scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)}, {Vector3(5, -2, 0), Vector3(7, 1, 12)}};
+    frames_ = scene_.look(Vector3(0.1, 0.2, 5.0), 45);  // no multiple of any vector
+    for (PosedDepthFrame& f : frames_) f.X_WC.R_RT = tilted() * f.X_WC.R_RT;
+    scene_.image[2][700] = std::numeric_limits<float>::quiet_NaN();
+    for (std::size_t i = 100; i < 130; ++i) scene_.image[1][i] = -1.0F;
+  }
+  test::Scene scene_;
+  std::vector<PosedDepthFrame> frames_;
+};
+
+TEST_F(BlockSight, IsBitEqualOnEveryInstructionSet) {
+  const std::array<Vector3, 1> here{Vector3(0.1, 0.2, 5.0)};
+  std::vector<std::uint64_t> digests;
+  int sets = 0;
+  const std::int64_t all = sight_instruction_sets();
+  for (unsigned bit = 0; bit < 63; ++bit) {
+    const std::int64_t set = all & (std::int64_t{1} << bit);
+    if (set == 0) continue;
+    const InstructionSet only(set);
+    ++sets;
+    for (int level = 0; level < 3; ++level) {
+      BrickMap::Config config;
+      config.bounds_W = {Vector3(-30, -30, -3), Vector3(30, 30, 12)};
+      config.max_bricks = 2000;
+      config.max_image_side = 64;
+      std::vector<std::byte> block(BrickMap::arena_bytes(config));
+      core::Arena arena(block);
+      BrickMap map(config, arena);
+      ASSERT_FALSE(arena.exhausted());
+      core::UnlimitedBudget unlimited;
+      IntegrationResult result;
+      ASSERT_EQ(map.integrate({frames_, level, kInfinity, here}, unlimited, result), Status::kOk);
+      ASSERT_EQ(map.integrate({frames_, level, kInfinity, here}, unlimited, result), Status::kOk);
+      EXPECT_GT(map.known_cells(), 10000U);
+      digests.push_back(map.digest());
+    }
+  }
+  ASSERT_GT(sets, 1);
+  for (std::size_t i = 3; i < digests.size(); ++i) EXPECT_EQ(digests[i], digests[i % 3]) << i;
+  EXPECT_NE(digests[0], digests[1]);
+}
+
+TEST_F(BlockSight, ABlockIsFreeOnlyIfEveryRayThroughItSeesPastIt) {
+  std::vector<std::byte> block(DepthPyramid::arena_bytes(45));
+  core::Arena arena(block);
+  DepthPyramid image(arena, 45);
+  ASSERT_EQ(image.build(frames_[0].frame), Status::kOk);
+  SightCameras cameras;
+  cameras.camera[0].prepare(frames_[0], image, {0.05, 0.0012});
+  cameras.count = 1;
+  cameras.complete = false;
+  core::CounterRng rng(5);
+  int free_blocks = 0;
+  int rays = 0;
+  for (int n = 0; n < 4000; ++n) {
+    const int level = 1 + static_cast<int>(rng.below(4));
+    std::array<Vector3, 8> center_W;
+    for (Vector3& c : center_W)
+      c = frames_[0].X_WC * Vector3(rng.uniform(0, 18), rng.uniform(-9, 9), rng.uniform(-9, 9));
+    const EightSeen seen = see_blocks(cameras, level, center_W);
+    for (unsigned i = 0; i < 8; ++i) {
+      if (((seen.free >> i) & 1U) == 0) continue;
+      ++free_blocks;
+      for (int k = 0; k < 20; ++k) {
+        const double half = 0.5 * cell_size_m(level);
+        const Vector3 p_W =
+            center_W[i] + half * Vector3(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1));
+        const Vector3 p_C = frames_[0].X_WC.inverse_times(p_W);
+        ASSERT_GT(p_C.x(), 0.0);
+        const int u = static_cast<int>((1.0 - p_C.y() / p_C.x()) * 22.5),
+                  v = static_cast<int>((1.0 - p_C.z() / p_C.x()) * 22.5);
+        ASSERT_TRUE(u >= 0 && u < 45 && v >= 0 && v < 45) << "a block that leaves the image is not free";
+        ASSERT_GE(static_cast<double>(frames_[0].frame.depth_m[static_cast<std::size_t>(v * 45 + u)]),
+                  p_C.x());
+        ++rays;
+      }
+    }
+  }
+  EXPECT_GT(free_blocks, 200);
+  EXPECT_GT(rays, 4000);
+}
+
+TEST_F(BlockSight, TheCellsOfARowAreWhereItsPixelsEnd) {
+  const PosedDepthFrame& posed = frames_[4];  // looks up or down: one of them sees the ground
+  const PosedDepthFrame& down = posed.X_WC.R_RT(2, 0) < 0.0 ? posed : frames_[5];
+  PixelLine line;
+  line.low = {-1000, -1000, -1000};
+  line.high = {1000, 1000, 1000};
+  const double pitch = 2.0 / 45.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto k = static_cast<Eigen::Index>(axis);
+    const double origin = 300.0 + down.X_WC.p_RT[k] / 0.3;
+    line.origin[axis] = static_cast<std::int32_t>(std::floor(origin));
+    line.rest[axis] = static_cast<float>(origin - std::floor(origin));
+    line.step[axis] = static_cast<float>(-pitch / 0.3 * down.X_WC.R_RT(k, 1));
+    const Vector3 first = down.X_WC.R_RT * Vector3(1.0, 1.0 - 0.5 * pitch, 1.0 - 22.5 * pitch) / 0.3;
+    line.first[axis] = static_cast<float>(first[k]);
+  }
+  const auto depths = down.frame.depth_m.subspan(22 * 45, 45);
+  auto row = std::make_unique<SurfaceRow>();
+  end_cells(line, depths, down.frame.range_m, *row);
+  ASSERT_GT(row->count, 5U);
+  std::size_t found = 0;
+  for (std::size_t n = 0; n < row->count; ++n) {
+    const Vector3 corner_W(0.3 * (row->cell[0][n] - 300), 0.3 * (row->cell[1][n] - 300),
+                           0.3 * (row->cell[2][n] - 300));
+    for (int u = 0; u < 45; ++u) {
+      const double depth_m = static_cast<double>(depths[static_cast<std::size_t>(u)]);
+      const Vector3 p_W = down.X_WC * (depth_m * Vector3(1.0, 1.0 - (u + 0.5) * pitch, 1.0 - 22.5 * pitch));
+      if (((p_W - corner_W).array() > -1e-3).all() && ((p_W - corner_W).array() < 0.301).all()) {
+        ++found;
+        break;
+      }
+    }
+  }
+  EXPECT_EQ(found, row->count);
+}
+
+}  // namespace
+}  // namespace roborun::stages
