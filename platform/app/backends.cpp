@@ -33,10 +33,10 @@ std::unique_ptr<stages::Planner> make_planner(const std::string& name, core::Are
   std::unique_ptr<stages::Planner> planner;
   if (name.rfind("ompl:", 0) == 0) planner = stages::make_ompl_planner(name.substr(5), {});
   if (planner == nullptr) {
-    throw sitl::InputError(
-        fmt::format("unknown planner '{}': must be own, ompl:RRTstar, ompl:InformedRRTstar, ompl:RRTConnect "
-                    "or ompl:BITstar",
-                    name));
+    throw sitl::InputError(fmt::format(
+        "unknown planner '{}': must be own or ompl:NAME, NAME one of OMPL's geometric planners (RRTstar, "
+        "InformedRRTstar, BITstar, ABITstar, AITstar, RRTConnect, PRMstar, FMT, ...)",
+        name));
   }
   return planner;
 }

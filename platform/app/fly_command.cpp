@@ -276,7 +276,7 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
   fly_app->add_option("--map", options->map, "own or octomap")->capture_default_str();
   fly_app
       ->add_option("--planner", options->planner,
-                   "own, ompl:RRTstar, ompl:InformedRRTstar, ompl:RRTConnect, ompl:BITstar")
+                   "own, or ompl:NAME with any of OMPL's geometric planners, such as ompl:RRTstar")
       ->capture_default_str();
   fly_app->add_option("--world", options->world, "World from a file instead: .toml, or OctoMap .bt / .ot");
   fly_app->add_option("--start", options->start, "With --world: X,Y,Z in metres");

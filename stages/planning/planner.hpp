@@ -23,6 +23,7 @@ struct PlanRequest {
   double radius_m{};     ///< Vehicle and tracking error; every point of the path keeps this box free.
   double volume_m3{};    ///< v2: stop when the explored volume exceeds it.
   double horizon_m{};    ///< No point of the path is farther from the start than this.
+  double satisfied_m{};  ///< A path to the goal of at most this length ends the search; 0: search on.
   std::uint64_t seed{};  ///< Same request, same map, same seed: same path.
 };
 

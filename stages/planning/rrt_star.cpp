@@ -30,7 +30,8 @@ RrtStar::RrtStar(const Config& config, core::Arena& arena) noexcept
     : config_(config),
       node_(arena.take<Node>(config.max_nodes, "planner nodes")),
       node_pool_(arena.last_pool()),
-      visited_(arena.take<std::uint64_t>(kVisited, "planner visited cells")) {}
+      visited_(arena.take<std::uint64_t>(kVisited, "planner visited cells")),
+      grid_(config.max_nodes, arena) {}
 
 double RrtStar::promise_m(const Node& node, const Vector3& goal_W) const noexcept {
   return node.cost_m + kUnknownWeight * (goal_W - node.p_W).norm();
@@ -54,7 +55,9 @@ double RrtStar::detour_m(const PlanRequest& request, const MapView& view, const 
   return 0.0;
 }
 
-Vector3 RrtStar::sample(const PlanRequest& request, core::CounterRng& rng) const noexcept {
+Vector3 RrtStar::sample(Search& s) const noexcept {
+  const PlanRequest& request = s.request;
+  core::CounterRng& rng = s.rng;
   const double kind = rng.uniform();
   const double x = rng.uniform(-1.0, 1.0);
   const double y = rng.uniform(-1.0, 1.0);
@@ -67,99 +70,109 @@ Vector3 RrtStar::sample(const PlanRequest& request, core::CounterRng& rng) const
   return p_W.cwiseMax(request.bounds_W.min_W).cwiseMin(request.bounds_W.max_W);
 }
 
-void RrtStar::add_node(const Vector3& p_W, std::int32_t parent, double cost_m, core::Work& work) noexcept {
-  node_[count_++] = {p_W, cost_m, parent};
+std::int32_t RrtStar::add_node(const Vector3& p_W, std::int32_t parent, core::Work& work) noexcept {
+  const auto index = static_cast<std::int32_t>(count_);
+  node_[count_++] = {p_W, 0.0, parent, -1, -1};
   node_pool_.use(count_);
+  grid_.insert(p_W);
+  if (parent >= 0) {
+    Node& self = node_[count_ - 1];
+    self.cost_m = node(parent).cost_m + (p_W - node(parent).p_W).norm();
+    self.next_sibling = node(parent).first_child;
+    node(parent).first_child = index;
+  }
   std::uint64_t key = 1;
   for (int i = 0; i < 3; ++i) {
-    const double index = std::clamp(std::floor(p_W[i] / kVisitedCell_m), -1e6, 1e6);
-    key = (key << 21U) | static_cast<std::uint64_t>(static_cast<std::int64_t>(index) + 1048576);
+    const double cell = std::clamp(std::floor(p_W[i] / kVisitedCell_m), -1e6, 1e6);
+    key = (key << 21U) | static_cast<std::uint64_t>(static_cast<std::int64_t>(cell) + 1048576);
   }
   std::size_t slot = core::mix64(key) % kVisited;
   // At most max_nodes keys; a table that fills up counts a cell twice, which ends the search earlier, not
   // later.
   for (std::size_t probe = 0; probe < 16; ++probe, slot = (slot + 1) % kVisited) {
-    if (visited_[slot] == key) return;
+    if (visited_[slot] == key) return index;
     if (visited_[slot] == 0) {
       visited_[slot] = key;
       break;
     }
   }
   work.volume_m3 += kVisitedCell_m3;
+  return index;
 }
 
-std::size_t RrtStar::neighbours_of(const Vector3& p_W, double radius_m,
-                                   std::array<Neighbour, kNeighbours>& found) const noexcept {
-  // The nearest kNeighbours within the radius, nearest first; found[0] is the nearest node even if outside.
-  std::size_t count = 0;
-  const double radius2 = radius_m * radius_m;
-  double worst2 = 1e300;
-  Neighbour nearest{0, 1e300};
-  for (std::size_t i = 0; i < count_; ++i) {
-    const double d2 = (node_[i].p_W - p_W).squaredNorm();
-    if (d2 < nearest.distance_m) nearest = {static_cast<std::int32_t>(i), d2};
-    if (d2 > radius2 || (count == kNeighbours && d2 >= worst2)) continue;
-    std::size_t at = count < kNeighbours ? count++ : kNeighbours - 1;
-    while (at > 0 && found[at - 1].distance_m > d2) {
-      found[at] = found[at - 1];
-      --at;
+void RrtStar::reparent(std::int32_t child, std::int32_t parent, double cost_m) noexcept {
+  std::int32_t* link = &node(node(child).parent).first_child;
+  while (*link != child) link = &node(*link).next_sibling;
+  *link = node(child).next_sibling;
+  node(child).parent = parent;
+  node(child).next_sibling = node(parent).first_child;
+  node(parent).first_child = child;
+  const double gain_m = node(child).cost_m - cost_m;
+  // The subtree in depth-first order; the links themselves say where to go on.
+  for (std::int32_t at = child;;) {
+    node(at).cost_m -= gain_m;
+    if (node(at).first_child >= 0) {
+      at = node(at).first_child;
+      continue;
     }
-    found[at] = {static_cast<std::int32_t>(i), d2};
-    worst2 = found[count - 1].distance_m;
+    while (at != child && node(at).next_sibling < 0) at = node(at).parent;
+    if (at == child) return;
+    at = node(at).next_sibling;
   }
-  if (count == 0) found[count++] = nearest;
-  for (std::size_t i = 0; i < count; ++i) found[i].distance_m = std::sqrt(found[i].distance_m);
-  return count;
 }
 
-void RrtStar::try_extend(const PlanRequest& request, const MapView& view, const Vector3& sample_W,
-                         core::Work& work) noexcept {
-  std::array<Neighbour, kNeighbours> near{};
-  (void)neighbours_of(sample_W, 0.0, near);
-  const Vector3 from_W = node_[static_cast<std::size_t>(near[0].node)].p_W;
-  const double distance_m = near[0].distance_m;
-  if (distance_m < kShortEdge_m) return;
-  const Vector3 p_W = distance_m <= config_.step_m
+std::int32_t RrtStar::try_extend(Search& s, const Vector3& sample_W, double bound_m) noexcept {
+  const PlanRequest& request = s.request;
+  const NodeGrid::Near nearest = grid_.nearest(sample_W);
+  const Vector3 from_W = node(nearest.index).p_W;
+  if (nearest.distance_m < kShortEdge_m) return -1;
+  const Vector3 p_W = nearest.distance_m <= config_.step_m
                           ? sample_W
-                          : Vector3(from_W + (sample_W - from_W) * (config_.step_m / distance_m));
-  if ((p_W - request.start_W).norm() > request.horizon_m) return;
-  if (!view.is_free(Aabb::around(p_W, request.radius_m), work.units)) return;
+                          : Vector3(from_W + (sample_W - from_W) * (config_.step_m / nearest.distance_m));
+  const double from_start_m = (p_W - request.start_W).norm();
+  const double to_goal_m = (request.goal_W - p_W).norm();
+  if (from_start_m > request.horizon_m || from_start_m + to_goal_m >= bound_m) return -1;
+  if (!s.view.is_free(Aabb::around(p_W, request.radius_m), s.work.units)) return -1;
 
   const double n = static_cast<double>(count_ + 1);
   const double shrink =
       std::sqrt(std::sqrt(core::log(n) / n));  // at least the (log n / n)^(1/3) of RRT* asks for
   const double radius_m = std::fmax(config_.rewire_m * std::fmin(1.0, 1.5 * shrink), 1.5);
-  const std::size_t count = neighbours_of(p_W, std::fmax(radius_m, (p_W - from_W).norm() + 1e-9), near);
-  std::int32_t parent = -1;
-  double cost_m = 1e300;
-  std::array<bool, kNeighbours> reachable{};
+  Neighbours near{};
+  const std::size_t count = grid_.within(p_W, std::fmax(radius_m, (p_W - from_W).norm() + 1e-9), near);
+  if (count == 0 || near[0].distance_m < kShortEdge_m) return -1;
+  // By cost: the first one that can be reached is the best parent, and no other one is checked.
+  std::array<std::size_t, kNeighbours> order{};
+  const auto cost_by = [&](std::size_t i) { return node(near[i].index).cost_m + near[i].distance_m; };
   for (std::size_t i = 0; i < count; ++i) {
-    const Node& candidate = node_[static_cast<std::size_t>(near[i].node)];
-    if (near[i].distance_m < kShortEdge_m) return;
-    if (candidate.cost_m + near[i].distance_m >= cost_m) continue;
-    reachable[i] = is_segment_free(view, candidate.p_W, p_W, request.radius_m, work.units);
-    if (reachable[i]) {
-      parent = near[i].node;
-      cost_m = candidate.cost_m + near[i].distance_m;
-    }
+    std::size_t at = i;
+    for (; at > 0 && cost_by(order[at - 1]) > cost_by(i); --at) order[at] = order[at - 1];
+    order[at] = i;
   }
-  if (parent < 0 || node_pool_.exhausted()) return;
-  const auto self = static_cast<std::int32_t>(count_);
-  add_node(p_W, parent, cost_m, work);
-  for (std::size_t i = 0; i < count; ++i) {
-    Node& other = node_[static_cast<std::size_t>(near[i].node)];
-    // Costs below a rewired node are left to be corrected by extract(): they only ever get smaller.
-    if (near[i].node == parent || cost_m + near[i].distance_m >= other.cost_m - 1e-9) continue;
-    if (!reachable[i] && !is_segment_free(view, p_W, other.p_W, request.radius_m, work.units)) continue;
-    other.parent = self;
-    other.cost_m = cost_m + near[i].distance_m;
+  std::int32_t self = -1;
+  std::size_t tried = 0;
+  for (; tried < count && self < 0; ++tried) {
+    const NodeGrid::Near& candidate = near[order[tried]];
+    if (cost_by(order[tried]) + to_goal_m >= bound_m) return -1;
+    if (!is_segment_free(s.view, node(candidate.index).p_W, p_W, request.radius_m, s.work.units)) continue;
+    if (!may_add()) return -1;
+    self = add_node(p_W, candidate.index, s.work);
   }
+  if (self < 0) return -1;
+  const double cost_m = node(self).cost_m;
+  for (std::size_t i = tried; i < count; ++i) {
+    const NodeGrid::Near& other = near[order[i]];
+    if (cost_m + other.distance_m >= node(other.index).cost_m - 1e-9) continue;
+    if (is_segment_free(s.view, p_W, node(other.index).p_W, request.radius_m, s.work.units))
+      reparent(other.index, self, cost_m + other.distance_m);
+  }
+  return self;
 }
 
 void RrtStar::extract(const PlanRequest& request, const MapView& view, std::int32_t node,
                       PlanResult& result) noexcept {
   constexpr std::size_t kMost = PlanResult::kMaxWaypoints;
-  std::array<Vector3, kMost> raw{};
+  std::array<Vector3, kMost> raw;
   std::size_t count = 0;
   for (std::int32_t i = node; i >= 0 && count < kMost; i = node_[static_cast<std::size_t>(i)].parent) {
     raw[count++] = node_[static_cast<std::size_t>(i)].p_W;
@@ -216,6 +229,17 @@ Status RrtStar::escape(const PlanRequest& request, const MapView& view, PlanResu
   return Status::kStartBlocked;
 }
 
+void RrtStar::clear(Search& s) noexcept {
+  const PlanRequest& request = s.request;
+  count_ = 0;
+  goal_ = -1;
+  std::fill(visited_.begin(), visited_.end(), 0U);
+  const Vector3 reach = Vector3::Constant(request.horizon_m);
+  grid_.reset({request.bounds_W.min_W.cwiseMax(request.start_W - reach),
+               request.bounds_W.max_W.cwiseMin(request.start_W + reach)});
+  add_node(request.start_W, -1, s.work);
+}
+
 Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::StageBudget& budget,
                      PlanResult& result) noexcept {
   result = {};
@@ -230,62 +254,57 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::Stag
   const bool goal_bad = !request.bounds_W.contains(request.goal_W) ||
                         view.at(request.goal_W, work.units) == CellState::kOccupied;
 
-  count_ = 0;
-  std::fill(visited_.begin(), visited_.end(), 0U);
-  add_node(request.start_W, -1, 0.0, work);
+  Search s{request, view, budget, work, core::CounterRng(request.seed, 7)};
+  clear(s);
   const Vector3 target_W = towards_goal(request);
   const double to_target_m = (target_W - request.start_W).norm();
+  if (to_target_m > kShortEdge_m && target_W == request.goal_W && !goal_bad &&
+      view.is_free(Aabb::around(target_W, request.radius_m), work.units)) {
+    const Status status = connect(s, result);
+    if (status != Status::kNoPath) return status;
+  }
   std::int32_t best = 0;
   if (to_target_m > kShortEdge_m) {
     const double free_m = free_distance_m(view, request.start_W, target_W - request.start_W, request.radius_m,
                                           to_target_m, work.units);
     if (free_m > 1.0) {
-      add_node(request.start_W + (target_W - request.start_W) * (free_m / to_target_m), 0, free_m, work);
-      best = 1;
+      const Vector3 end_W = request.start_W + (target_W - request.start_W) * (free_m / to_target_m);
+      // Checked once more: this is an edge, and its samples lie elsewhere.
+      if (is_segment_free(view, request.start_W, end_W, request.radius_m, work.units) && may_add())
+        best = add_node(end_W, 0, work);
     }
-    if (free_m >= to_target_m) {
-      if (request.bounds_W.contains(target_W)) {
-        extract(request, view, best, result);
-        result.reaches_goal = target_W == request.goal_W;
-        return goal_bad ? Status::kGoalBlocked : Status::kOk;
-      }
+    if (best > 0 && free_m >= to_target_m && request.bounds_W.contains(target_W)) {
+      extract(request, view, best, result);
+      result.reaches_goal = target_W == request.goal_W;
+      return goal_bad ? Status::kGoalBlocked : Status::kOk;
     }
   }
+  return explore(s, goal_bad, best, result);
+}
 
-  core::CounterRng rng(request.seed, 7);
+Status RrtStar::explore(Search& s, bool goal_bad, std::int32_t best, PlanResult& result) noexcept {
+  const PlanRequest& request = s.request;
+  const MapView& view = s.view;
+  core::Work& work = s.work;
   Status status = Status::kOk;
-  double best_m = promise_m(node_[static_cast<std::size_t>(best)], request.goal_W) +
-                  detour_m(request, view, node_[static_cast<std::size_t>(best)].p_W, work.units);
+  double best_m = promise_m(node(best), request.goal_W) + detour_m(request, view, node(best).p_W, work.units);
   double mark_m = best_m;
   std::uint32_t mark = 0;
-  for (std::uint32_t i = 0; i < config_.max_samples && count_ < node_.size(); ++i) {
-    if (work.volume_m3 >= request.volume_m3 || budget.spent(work)) {
+  for (std::uint32_t i = 0; i < config_.max_samples && !full(); ++i) {
+    if (is_over(s)) {
       status = Status::kBudgetSpent;
       break;
     }
-    const Vector3 sample_W = sample(request, rng);
+    const Vector3 sample_W = sample(s);
     // Nothing that starts out longer than the best promise can become better than it.
     if ((sample_W - request.start_W).norm() > best_m) continue;
-    const std::size_t before = count_;
-    try_extend(request, view, sample_W, work);
-    if (count_ > before) {
-      double promise = promise_m(node_[count_ - 1], request.goal_W);
-      if (promise < best_m) promise += detour_m(request, view, node_[count_ - 1].p_W, work.units);
+    const std::int32_t added = try_extend(s, sample_W, 1e300);
+    if (added >= 0) {
+      double promise = promise_m(node(added), request.goal_W);
+      if (promise < best_m) promise += detour_m(request, view, node(added).p_W, work.units);
       if (promise < best_m) {
         best_m = promise;
-        best = static_cast<std::int32_t>(count_ - 1);
-      }
-      // The goal itself, when it comes within reach.
-      const Vector3 way = request.goal_W - node_[count_ - 1].p_W;
-      if (way.norm() <= config_.step_m && way.norm() > kShortEdge_m && count_ < node_.size() && !goal_bad &&
-          (request.goal_W - request.start_W).norm() <= request.horizon_m &&
-          is_segment_free(view, node_[count_ - 1].p_W, request.goal_W, request.radius_m, work.units)) {
-        const double cost_m = node_[count_ - 1].cost_m + way.norm();
-        if (cost_m < best_m) {
-          add_node(request.goal_W, static_cast<std::int32_t>(count_ - 1), cost_m, work);
-          best = static_cast<std::int32_t>(count_ - 1);
-          best_m = cost_m;
-        }
+        best = added;
       }
     }
     if (best_m < 0.99 * mark_m) {
@@ -297,7 +316,7 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::Stag
 
   // Better than standing still by at least one cell of the view.
   const double stay_m =
-      promise_m(node_[0], request.goal_W) + detour_m(request, view, request.start_W, work.units);
+      promise_m(node(0), request.goal_W) + detour_m(request, view, request.start_W, work.units);
   if (best == 0 || best_m > stay_m - view.cell_m()) return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
   extract(request, view, best, result);
   if (result.path_W.size() < 2) return Status::kNoPath;

@@ -9,14 +9,19 @@
 #include "core/memory/arena.hpp"
 #include "core/precision.hpp"
 #include "core/random/counter_rng.hpp"
+#include "stages/planning/node_grid.hpp"
 #include "stages/planning/planner.hpp"
+#include "stages/planning/shorten.hpp"
 
 namespace roborun::stages {
 
-/// The tree grows from the start through known free space only. The goal is most often far outside, so the
-/// answer is the node of least (cost to come + kUnknownWeight * straight distance to the goal + up to 10 m if
-/// a surface stands in the way there), ties by index, then shortened. Open space costs nothing: if the
-/// straight way to the goal (or to the horizon) is free, that is the answer.
+/// The tree grows from the start through known free space only. If the straight way to the goal (or to the
+/// horizon) is free, that is the answer. Otherwise there are two cases:
+///  - The goal lies in known free space within the horizon: straight on towards it wherever that is free and
+///    sideways where it is not (the first solution), then RRT* with samples from the ellipsoid that can still
+///    hold a shorter path; each better path is pulled tight and goes back into the tree.
+///  - It does not: the answer is the node of least (cost to come + kUnknownWeight * straight distance to the
+///    goal + up to 10 m if a surface stands in the way there), ties by index, then shortened.
 class RrtStar final : public Planner {
  public:
   struct Config {
@@ -34,7 +39,8 @@ class RrtStar final : public Planner {
     }
   };
   [[nodiscard]] static constexpr std::size_t arena_bytes(const Config& config) noexcept {
-    return config.max_nodes * sizeof(Node) + kVisited * sizeof(std::uint64_t) + 64;
+    return config.max_nodes * sizeof(Node) + kVisited * sizeof(std::uint64_t) + 128 +
+           NodeGrid::arena_bytes(config.max_nodes);
   }
   /// Precondition: config.validate() is kOk. Check arena.exhausted() afterwards.
   RrtStar(const Config& config, core::Arena& arena) noexcept;
@@ -48,20 +54,51 @@ class RrtStar final : public Planner {
   static constexpr std::size_t kNeighbours = 12;
   struct Node {
     Vector3 p_W = Vector3::Zero();
-    double cost_m{};
+    double cost_m{};  ///< Along the tree, always up to date.
     std::int32_t parent{-1};
+    std::int32_t first_child{-1};
+    std::int32_t next_sibling{-1};
   };
-  struct Neighbour {
-    std::int32_t node;
-    double distance_m;
+  using Neighbours = std::array<NodeGrid::Near, kNeighbours>;
+  /// What one call of plan() works on.
+  struct Search {
+    const PlanRequest& request;
+    const MapView& view;
+    core::StageBudget& budget;
+    core::Work& work;
+    core::CounterRng rng;
   };
 
-  [[nodiscard]] Vector3 sample(const PlanRequest& request, core::CounterRng& rng) const noexcept;
-  void try_extend(const PlanRequest& request, const MapView& view, const Vector3& sample_W,
-                  core::Work& work) noexcept;
-  [[nodiscard]] std::size_t neighbours_of(const Vector3& p_W, double radius_m,
-                                          std::array<Neighbour, kNeighbours>& found) const noexcept;
-  void add_node(const Vector3& p_W, std::int32_t parent, double cost_m, core::Work& work) noexcept;
+  [[nodiscard]] Node& node(std::int32_t index) noexcept { return node_[static_cast<std::size_t>(index)]; }
+  [[nodiscard]] bool full() const noexcept { return count_ == node_.size(); }
+  /// To be asked before each add_node().
+  [[nodiscard]] bool may_add() noexcept { return !full() && !node_pool_.exhausted(); }
+  /// The tree is the start alone.
+  void clear(Search& s) noexcept;
+  std::int32_t add_node(const Vector3& p_W, std::int32_t parent, core::Work& work) noexcept;
+  void reparent(std::int32_t child, std::int32_t parent, double cost_m) noexcept;
+  /// A step from the nearest node towards the sample, by the best parent, and rewiring; -1 if nothing came of
+  /// it, or if no path of at most `bound_m` to the goal could lead there.
+  std::int32_t try_extend(Search& s, const Vector3& sample_W, double bound_m) noexcept;
+  [[nodiscard]] bool is_over(Search& s) const noexcept {
+    return s.work.volume_m3 >= s.request.volume_m3 || s.budget.spent(s.work);
+  }
+
+  // The goal is known free space.
+  [[nodiscard]] Status connect(Search& s, PlanResult& result) noexcept;
+  [[nodiscard]] bool find_first(Search& s) noexcept;
+  [[nodiscard]] std::int32_t advance(Search& s, std::int32_t from) noexcept;
+  [[nodiscard]] Vector3 informed_sample(Search& s, double bound_m) const noexcept;
+  [[nodiscard]] bool path_to(std::int32_t node, Path& path_W) const noexcept;
+  /// The tree's path to a node and from there on along the best one, if free and at most `bound_m` long: how
+  /// the other side of a single obstacle is tried. False: nothing to try, candidate_W is of no use.
+  [[nodiscard]] bool splice(Search& s, std::int32_t from, const Path& best_W, double bound_m,
+                            Path& candidate_W) const noexcept;
+  void add_path(const Path& path_W, core::Work& work) noexcept;
+
+  // It is not.
+  [[nodiscard]] Status explore(Search& s, bool goal_bad, std::int32_t best, PlanResult& result) noexcept;
+  [[nodiscard]] Vector3 sample(Search& s) const noexcept;
   [[nodiscard]] double promise_m(const Node& node, const Vector3& goal_W) const noexcept;
   /// What the first surface on the straight way on to the goal will cost, 0 if none is known within 12 m.
   [[nodiscard]] double detour_m(const PlanRequest& request, const MapView& view, const Vector3& p_W,
@@ -75,7 +112,9 @@ class RrtStar final : public Planner {
   std::span<Node> node_;
   core::PoolRecord& node_pool_;
   std::span<std::uint64_t> visited_;
+  NodeGrid grid_;
   std::size_t count_{0};
+  std::int32_t goal_{-1};  ///< The goal's node, once it is reached.
 };
 
 }  // namespace roborun::stages

@@ -5,16 +5,10 @@
 #include <cmath>
 #include <limits>
 
-#include "core/geometry/inverse.hpp"
 #include "core/memory/static_vector.hpp"
 
 namespace roborun::stages {
 namespace {
-
-using Vector10 = Eigen::Matrix<double, 10, 1>;
-using Matrix4 = Eigen::Matrix4d;
-using Ends3 = Eigen::Matrix<double, 10, 3>;
-using Block = Eigen::Matrix<double, 4, 3>;
 
 constexpr double kAtRest = 0.05;  // m/s and m/s2
 constexpr double kSameWaypoint_m = 0.25;
@@ -41,32 +35,20 @@ double corner_speed_mps(const Vector3& before, const Vector3& after, double a_mp
   return std::sqrt(a_mps2 * kCornerCut_m * half / (1.0 - half));
 }
 
-}  // namespace
-
-Smoother::Smoother() noexcept {
-  Matrix10 ends = Matrix10::Zero();  // ends = ends_of_coefficient * c
-  for (int d = 0; d < 5; ++d) {
-    double falling = 1.0;
-    for (int i = 0; i < d; ++i) falling *= d - i;
-    ends(d, d) = falling;
-    for (int k = d; k < 10; ++k) {
-      double product = 1.0;
-      for (int i = 0; i < d; ++i) product *= k - i;
-      ends(5 + d, k) = product;
-    }
+/// Raises the squares of speed and acceleration to those at one instant.
+void add_motion(const PolynomialSegment& segment, double at_s, double& speed2,
+                double& acceleration2) noexcept {
+  Vector3 v_W = Vector3::Zero();
+  Vector3 a_W = Vector3::Zero();
+  for (std::size_t k = PolynomialSegment::kCoefficients; k-- > 1;) {
+    a_W = a_W * at_s + v_W;
+    v_W = v_W * at_s + static_cast<double>(k) * segment.coefficient[k];
   }
-  coefficient_of_ends_ = core::inverse<10>(ends);
-  Matrix10 hessian = Matrix10::Zero();
-  for (int i = 4; i < 10; ++i) {
-    for (int k = 4; k < 10; ++k) {
-      double product = 1.0;
-      for (int d = 0; d < 4; ++d) product *= static_cast<double>((i - d) * (k - d));
-      hessian(i, k) = product / (i + k - 7);
-    }
-  }
-  const Matrix10 half = hessian.lazyProduct(coefficient_of_ends_);
-  snap_cost_ = coefficient_of_ends_.transpose().lazyProduct(half);
+  speed2 = std::max(speed2, v_W.squaredNorm());
+  acceleration2 = std::max(acceleration2, a_W.squaredNorm());
 }
+
+}  // namespace
 
 bool Smoother::allocate(std::span<const Vector3> path_W, const TrajectoryPoint& start,
                         const MotionLimits& limits, Plan& plan) const noexcept {
@@ -139,69 +121,8 @@ bool Smoother::allocate(std::span<const Vector3> path_W, const TrajectoryPoint& 
 }
 
 bool Smoother::solve(const Plan& plan, const TrajectoryPoint& start, Trajectory& out) const noexcept {
-  // Unknown: velocity, acceleration, jerk, snap at each inner knot, for the three axes at once.
-  const std::size_t segments = plan.count - 1;
-  std::array<Matrix4, kMaxKnots> diagonal{};
-  std::array<Matrix4, kMaxKnots> upper{};
-  std::array<Block, kMaxKnots> right{};
-  for (std::size_t k = 0; k < plan.count; ++k) {
-    diagonal[k].setZero();
-    right[k].setZero();
-  }
-  std::array<Block, kMaxKnots> x{};
-  for (Block& block : x) block.setZero();
-  x[0].row(0) = start.v_W.transpose();
-  x[0].row(1) = start.a_W.transpose();
-  x[0].row(2) = start.j_W.transpose();
-
-  for (std::size_t k = 0; k < segments; ++k) {
-    const double T = plan.time_s[k + 1];
-    Vector10 scale;
-    scale << 1.0, T, T * T, T * T * T, T * T * T * T, 1.0, T, T * T, T * T * T, T * T * T * T;
-    const double T7 = T * T * T * T * T * T * T;
-    const Matrix10 Q = (scale.asDiagonal() * snap_cost_ * scale.asDiagonal()) / T7;
-    const Eigen::Matrix<double, 1, 3> p0 = plan.knot_W[k].transpose();
-    const Eigen::Matrix<double, 1, 3> p1 = plan.knot_W[k + 1].transpose();
-    diagonal[k] += Q.block<4, 4>(1, 1);
-    diagonal[k + 1] += Q.block<4, 4>(6, 6);
-    upper[k] = Q.block<4, 4>(1, 6);
-    right[k] -= Q.block<4, 1>(1, 0) * p0 + Q.block<4, 1>(1, 5) * p1;
-    right[k + 1] -= Q.block<4, 1>(6, 0) * p0 + Q.block<4, 1>(6, 5) * p1;
-  }
-  if (segments > 1) {
-    right[1] -= upper[0].transpose() * x[0];
-    std::array<Matrix4, kMaxKnots> gain{};
-    for (std::size_t k = 1; k < segments;
-         ++k) {  // block Gauss elimination; the end is at rest: x[segments] = 0
-      const Matrix4 inverse = core::inverse<4>(diagonal[k]);
-      gain[k] = inverse * upper[k];
-      right[k] = (inverse * right[k]).eval();
-      if (k + 1 < segments) {
-        diagonal[k + 1] -= upper[k].transpose() * gain[k];
-        right[k + 1] -= upper[k].transpose() * right[k];
-      }
-    }
-    for (std::size_t k = segments - 1; k >= 1; --k) x[k] = right[k] - gain[k] * x[k + 1];
-  }
-
-  out.segment_count = segments;
-  for (std::size_t k = 0; k < segments; ++k) {
-    const double T = plan.time_s[k + 1];
-    Ends3 ends;
-    ends.row(0) = plan.knot_W[k].transpose();
-    ends.row(5) = plan.knot_W[k + 1].transpose();
-    double power = T;
-    for (int d = 0; d < 4; ++d, power *= T) {
-      ends.row(1 + d) = power * x[k].row(d);
-      ends.row(6 + d) = power * x[k + 1].row(d);
-    }
-    const Ends3 coefficient = coefficient_of_ends_.lazyProduct(ends);
-    if (!coefficient.allFinite()) return false;
-    out.segment[k].duration_s = T;
-    power = 1.0;
-    for (int i = 0; i < 10; ++i, power /= T)
-      out.segment[k].coefficient[static_cast<std::size_t>(i)] = power * coefficient.row(i).transpose();
-  }
+  if (!minimum_snap_.solve({plan.knot_W.data(), plan.count}, {plan.time_s.data(), plan.count}, start, out))
+    return false;
   out.brake_begin_s = 0.0;
   for (std::size_t k = 0; k < plan.brake_knot; ++k) out.brake_begin_s += plan.time_s[k + 1];
   return true;
@@ -216,14 +137,13 @@ bool Smoother::stretch_to_limits(Plan& plan, const SmoothRequest& request, const
     if (!solve(plan, request.start, out)) return false;
     bool fine = true;
     for (std::size_t k = 0; k < out.segment_count; ++k) {
-      Trajectory one;
-      one.segment_count = 1;
-      one.segment[0] = out.segment[k];
-      double worst = 1.0;
-      for (int i = 0; i <= kSamples; ++i) {
-        const TrajectoryPoint p = one.at_s(0.9999 * out.segment[k].duration_s * i / kSamples);
-        worst = std::max({worst, p.v_W.norm() / speed_limit, std::sqrt(p.a_W.norm() / acceleration_limit)});
-      }
+      // Compared as squares; the roots are taken once.
+      double speed2 = 0.0;
+      double acceleration2 = 0.0;
+      for (int i = 0; i <= kSamples; ++i)
+        add_motion(out.segment[k], out.segment[k].duration_s * i / kSamples, speed2, acceleration2);
+      const double worst = std::max(
+          {1.0, std::sqrt(speed2) / speed_limit, std::sqrt(std::sqrt(acceleration2) / acceleration_limit)});
       if (worst > 1.0) {
         fine = false;
         plan.time_s[k + 1] *= std::min(1.0 + 1.1 * (worst - 1.0) + 0.02, 1.5);

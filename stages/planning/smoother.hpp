@@ -1,7 +1,4 @@
 /// From a piecewise-straight path to a trajectory that the vehicle can fly and that ends in a stop.
-/// Source: Richter, Bry, Roy, "Polynomial trajectory planning for aggressive quadrotor flight" (2016):
-/// minimum snap with the derivatives at the way-points free, solved in closed form; here as a
-/// block-tridiagonal system, O(way-points).
 #pragma once
 
 #include <array>
@@ -12,6 +9,7 @@
 #include "core/trajectory.hpp"
 #include "firmware_if/status.hpp"
 #include "stages/perception/map_view.hpp"
+#include "stages/planning/minimum_snap.hpp"
 
 namespace roborun::stages {
 
@@ -35,8 +33,6 @@ struct SmoothResult {
 
 class Smoother {
  public:
-  Smoother() noexcept;
-
   /// Time is given by a trapezoidal speed profile along the path under the limits (corners slower), with a
   /// way-point where the final braking begins; the curve is then checked: too fast, and the segment gets more
   /// time; not free, and the straight piece below it gets one more way-point; still not, and the speed limit
@@ -54,13 +50,12 @@ class Smoother {
                              const MotionLimits& limits, Trajectory& out) const noexcept;
 
  private:
-  static constexpr std::size_t kMaxKnots = Trajectory::kMaxSegments + 1;
-  using Matrix10 = Eigen::Matrix<double, 10, 10>;
+  static constexpr std::size_t kMaxKnots = MinimumSnap::kMaxKnots;
   struct Plan {
     std::size_t count{};  ///< Knots.
-    std::array<Vector3, kMaxKnots> knot_W{};
-    std::array<double, kMaxKnots> time_s{};  ///< Of the segment that ends at the knot.
-    std::size_t brake_knot{};                ///< Where the final braking begins.
+    std::array<Vector3, kMaxKnots> knot_W;
+    std::array<double, kMaxKnots> time_s;  ///< Of the segment that ends at the knot.
+    std::size_t brake_knot{};              ///< Where the final braking begins.
   };
 
   [[nodiscard]] bool allocate(std::span<const Vector3> path_W, const TrajectoryPoint& start,
@@ -69,8 +64,7 @@ class Smoother {
   [[nodiscard]] bool stretch_to_limits(Plan& plan, const SmoothRequest& request, const MotionLimits& limits,
                                        Trajectory& out) const noexcept;
 
-  Matrix10 coefficient_of_ends_;  ///< Polynomial on [0, 1] from value and four derivatives at both ends.
-  Matrix10 snap_cost_;            ///< Integral of squared snap as a quadratic form of the ends, on [0, 1].
+  MinimumSnap minimum_snap_;
 };
 
 /// Adds a straight piece from rest at `from_W` to rest at `to_W` within the limits, and makes its second half

@@ -1,20 +1,15 @@
 #include "stages/planning/ompl_backend/ompl_backend.hpp"
 
 #include <ompl/base/PlannerTerminationCondition.h>
-#include <ompl/base/SpaceInformation.h>
-#include <ompl/base/objectives/PathLengthOptimizationObjective.h>
-#include <ompl/base/spaces/RealVectorStateSpace.h>
 #include <ompl/geometric/PathGeometric.h>
-#include <ompl/geometric/planners/informedtrees/BITstar.h>
-#include <ompl/geometric/planners/rrt/InformedRRTstar.h>
-#include <ompl/geometric/planners/rrt/RRTConnect.h>
-#include <ompl/geometric/planners/rrt/RRTstar.h>
 #include <ompl/util/Console.h>
 #include <ompl/util/RandomNumbers.h>
 
 #include <algorithm>
 #include <cmath>
 #include <string>
+
+#include "stages/planning/ompl_backend/ompl_space.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -24,33 +19,6 @@ namespace og = ompl::geometric;
 
 constexpr std::uint_fast32_t kSeed = 20210;
 constexpr double kExplored_m3 = 4.8 * 4.8 * 4.8;  // of each node, as in the own planner's volume monitor
-
-Vector3 to_vector(const ob::State* state) {
-  const auto* p = state->as<ob::RealVectorStateSpace::StateType>();
-  return {(*p)[0], (*p)[1], (*p)[2]};
-}
-
-/// Straight motions, checked by the same function as the own planner's.
-class SegmentValidator final : public ob::MotionValidator {
- public:
-  SegmentValidator(ob::SpaceInformation* info, const MapView& view, double radius_m, std::uint64_t& lookups)
-      : ob::MotionValidator(info), view_(view), radius_m_(radius_m), lookups_(lookups) {}
-  bool checkMotion(const ob::State* a, const ob::State* b) const override {
-    return is_segment_free(view_, to_vector(a), to_vector(b), radius_m_, lookups_);
-  }
-  bool checkMotion(const ob::State* a, const ob::State* b,
-                   std::pair<ob::State*, double>& last) const override {
-    if (checkMotion(a, b)) return true;
-    last.second = 0.0;
-    if (last.first != nullptr) si_->copyState(last.first, a);
-    return false;
-  }
-
- private:
-  const MapView& view_;
-  double radius_m_;
-  std::uint64_t& lookups_;
-};
 
 class OmplPlanner final : public Planner {
  public:
@@ -66,13 +34,6 @@ class OmplPlanner final : public Planner {
   }
 
  private:
-  [[nodiscard]] ob::PlannerPtr make(const ob::SpaceInformationPtr& info) const {
-    if (name_ == "RRTstar") return std::make_shared<og::RRTstar>(info);
-    if (name_ == "InformedRRTstar") return std::make_shared<og::InformedRRTstar>(info);
-    if (name_ == "RRTConnect") return std::make_shared<og::RRTConnect>(info);
-    return std::make_shared<og::BITstar>(info);
-  }
-
   Status solve(const PlanRequest& request, const MapView& view, core::StageBudget& budget,
                PlanResult& result) {
     result = {};
@@ -90,34 +51,13 @@ class OmplPlanner final : public Planner {
     const bool goal_bad = !request.bounds_W.contains(request.goal_W) ||
                           view.at(request.goal_W, work.units) == CellState::kOccupied;
 
-    const auto space = std::make_shared<ob::RealVectorStateSpace>(3);
-    ob::RealVectorBounds bounds(3);
-    for (unsigned i = 0; i < 3; ++i) {
-      bounds.setLow(i, low[i]);
-      bounds.setHigh(i, high[i]);
-    }
-    space->setBounds(bounds);
-    const auto info = std::make_shared<ob::SpaceInformation>(space);
-    info->setStateValidityChecker([&](const ob::State* s) {
-      return view.is_free(Aabb::around(to_vector(s), request.radius_m), work.units);
-    });
-    info->setMotionValidator(
-        std::make_shared<SegmentValidator>(info.get(), view, request.radius_m, work.units));
-    info->setup();
-
-    const auto problem = std::make_shared<ob::ProblemDefinition>(info);
-    ob::ScopedState<ob::RealVectorStateSpace> start(space);
-    ob::ScopedState<ob::RealVectorStateSpace> goal(space);
+    const ob::SpaceInformationPtr info = make_ompl_space(view, {low, high}, request.radius_m, work.units);
     // Outside the box or unknown, the goal is moved onto its border: the nearest approximation of it is what
     // is asked for.
     const Vector3 target_W = request.goal_W.cwiseMax(low).cwiseMin(high);
-    for (unsigned i = 0; i < 3; ++i) {
-      start[i] = request.start_W[i];
-      goal[i] = target_W[i];
-    }
-    problem->setStartAndGoalStates(start, goal, view.cell_m());
-    problem->setOptimizationObjective(std::make_shared<ob::PathLengthOptimizationObjective>(info));
-    const ob::PlannerPtr planner = make(info);
+    const ob::ProblemDefinitionPtr problem =
+        make_ompl_problem(info, request.start_W, target_W, view.cell_m());
+    const ob::PlannerPtr planner = allocate_ompl_planner(name_, info);
     planner->setProblemDefinition(problem);
     planner->setup();
 
@@ -159,8 +99,8 @@ class OmplPlanner final : public Planner {
 
 std::unique_ptr<Planner> make_ompl_planner(std::string_view name, const OmplConfig& config) noexcept {
   try {
-    if (name != "RRTstar" && name != "InformedRRTstar" && name != "RRTConnect" && name != "BITstar")
-      return nullptr;
+    const auto names = ompl_planner_names();
+    if (std::find(names.begin(), names.end(), name) == names.end()) return nullptr;
     ompl::msg::setLogLevel(ompl::msg::LOG_NONE);
     ompl::RNG::setSeed(kSeed);
     return std::make_unique<OmplPlanner>(std::string(name), config);

@@ -14,7 +14,7 @@ struct OmplConfig {
       3000};  ///< Termination checks of the planner: a bound that repeats, unlike wall time.
 };
 
-/// "RRTstar", "InformedRRTstar", "RRTConnect" or "BITstar"; nullptr for another name. The space is R3 inside
+/// Any of ompl_planner_names() (ompl_space.hpp); nullptr for another name. The space is R3 inside
 /// the bounds and the horizon; the goal is the mission's goal if it lies there and is free, otherwise the
 /// known-free point of the direct way; without an exact solution the approximate one is taken. The library's
 /// exceptions end here. Repeats for the same sequence of calls in a process: OMPL has one global seed, set by

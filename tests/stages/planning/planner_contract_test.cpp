@@ -1,9 +1,13 @@
 #include <gtest/gtest.h>
+#include <ompl/geometric/SimpleSetup.h>
+#include <ompl/tools/benchmark/Benchmark.h>
 
 #include <memory>
 
 #include "core/random/counter_rng.hpp"
 #include "stages/planning/ompl_backend/ompl_backend.hpp"
+#include "stages/planning/ompl_backend/ompl_space.hpp"
+#include "stages/planning/ompl_backend/planner_for_ompl.hpp"
 #include "stages/planning/rrt_star.hpp"
 #include "tests/support/box_view.hpp"
 #include "tests/support/no_alloc_scope.hpp"
@@ -112,6 +116,55 @@ INSTANTIATE_TEST_SUITE_P(Planners, PlannerContract, ::testing::Values("own", "RR
 
 TEST(OmplPlanner, RefusesUnknownNames) { EXPECT_EQ(make_ompl_planner("Foo", {}), nullptr); }
 
+TEST(OmplPlanner, EveryNameFliesOrNamesWhyNot) {
+  const test::BoxView view = pillar_world();
+  core::UnlimitedBudget unlimited;
+  int reached = 0;
+  for (const std::string_view name : ompl_planner_names()) {
+    const std::unique_ptr<Planner> sut = make_ompl_planner(name, {200});
+    ASSERT_NE(sut, nullptr) << name;
+    const PlanRequest r = request_to(Vector3(18, 1, 5));
+    PlanResult result;
+    const Status status = sut->plan(r, view, unlimited, result);
+    EXPECT_TRUE(status == Status::kOk || status == Status::kNoPath) << name << " " << to_string(status);
+    std::uint64_t lookups = 0;
+    for (std::size_t i = 0; i + 1 < result.path_W.size(); ++i) {
+      ASSERT_TRUE(is_segment_free(view, result.path_W[i], result.path_W[i + 1], r.radius_m, lookups)) << name;
+    }
+    reached += result.reaches_goal ? 1 : 0;
+  }
+  EXPECT_GE(reached, 15) << "with so few iterations";
+}
+
+/// OMPL measures both planners; ours keeps what OMPL promises: an exact solution that passes OMPL's own
+/// checks.
+TEST(OmplPlanner, MeasuresOursBesideItsOwn) {
+  const test::BoxView view = pillar_world();
+  std::uint64_t lookups = 0;
+  const PlanRequest r = request_to(Vector3(18, 1, 5));
+  const auto info = make_ompl_space(view, r.bounds_W, r.radius_m, lookups);
+  ompl::geometric::SimpleSetup setup(info);
+  const auto problem = make_ompl_problem(info, r.start_W, r.goal_W, 0.3);
+  setup.setStartState(ompl::base::ScopedState<>(info->getStateSpace(), problem->getStartState(0)));
+  setup.setGoal(problem->getGoal());
+  setup.setOptimizationObjective(problem->getOptimizationObjective());
+  ompl::tools::Benchmark sut(setup, "pillar");
+  sut.addPlanner(make_planner_for_ompl(info, view, r.radius_m, {}));
+  sut.addPlanner(allocate_ompl_planner("RRTConnect", info));
+  ompl::tools::Benchmark::Request request(0.2, 500.0, 3, 0.05, false, false, false);
+  sut.benchmark(request);
+  const auto& data = sut.getRecordedExperimentData();
+  ASSERT_EQ(data.planners.size(), 2U);
+  EXPECT_EQ(data.planners[0].name, "geometric_roborun_RRTstar") << "OMPL adds the prefix";
+  for (const auto& planner : data.planners) {
+    ASSERT_EQ(planner.runs.size(), 3U);
+    for (const auto& run : planner.runs) {
+      EXPECT_EQ(run.at("solved BOOLEAN"), "1") << planner.name;
+      EXPECT_EQ(run.at("correct solution BOOLEAN"), "1") << planner.name;
+    }
+  }
+}
+
 TEST(RrtStar, RepeatsForTheSameSeed) {
   std::vector<std::byte> block(4U << 20U);
   core::Arena arena(block);
@@ -126,6 +179,72 @@ TEST(RrtStar, RepeatsForTheSameSeed) {
   (void)sut.plan(request_to(Vector3(150, 0, 5)), view, unlimited, b);
   ASSERT_EQ(a.path_W.size(), b.path_W.size());
   for (std::size_t i = 0; i < a.path_W.size(); ++i) EXPECT_EQ(a.path_W[i], b.path_W[i]);
+}
+
+/// 60 m of known space with a row of pillars across the straight line, and the goal at its end.
+test::BoxView aisle() {
+  test::BoxView view;
+  view.free_W = {Vector3(-9, -24, 0), Vector3(69, 24, 12)};
+  for (const double x : {12.0, 27.0, 42.0})
+    view.occupied.push_back({Vector3(x, -3, 0), Vector3(x + 3, 3, 20)});
+  return view;
+}
+PlanRequest through_the_aisle() {
+  PlanRequest r = request_to(Vector3(60, 0, 5));
+  r.horizon_m = 120.0;
+  return r;
+}
+
+TEST(RrtStar, PullsAPathToAKnownGoalTight) {
+  std::vector<std::byte> block(4U << 20U);
+  core::Arena arena(block);
+  RrtStar sut({}, arena);
+  const test::BoxView view = aisle();
+  core::UnlimitedBudget unlimited;
+  PlanResult result;
+  // Around the corners of the first pillar, (11.1, 3.9), and of the last, (45.9, 3.9): 61.0 m; the boxes of a
+  // check reach a little farther than the vehicle.
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    PlanRequest r = through_the_aisle();
+    r.seed = seed;
+    ASSERT_EQ(sut.plan(r, view, unlimited, result), Status::kOk);
+    EXPECT_TRUE(result.reaches_goal);
+    EXPECT_GT(result.cost_m, 60.9);
+    EXPECT_LT(result.cost_m, 62.2) << "seed " << seed;
+    std::uint64_t lookups = 0;
+    for (std::size_t i = 0; i + 1 < result.path_W.size(); ++i)
+      ASSERT_TRUE(is_segment_free(view, result.path_W[i], result.path_W[i + 1], r.radius_m, lookups));
+  }
+}
+
+TEST(RrtStar, EndsWithTheFirstPathThatSatisfies) {
+  std::vector<std::byte> block(4U << 20U);
+  core::Arena arena(block);
+  RrtStar sut({}, arena);
+  const test::BoxView view = aisle();
+  core::UnlimitedBudget unlimited;
+  PlanResult first, best;
+  PlanRequest r = through_the_aisle();
+  ASSERT_EQ(sut.plan(r, view, unlimited, best), Status::kOk);
+  r.satisfied_m = 1e300;
+  ASSERT_EQ(sut.plan(r, view, unlimited, first), Status::kOk);
+  EXPECT_TRUE(first.reaches_goal);
+  EXPECT_LT(first.work.units, best.work.units / 10);
+  EXPECT_GE(first.cost_m, best.cost_m);
+}
+
+TEST(RrtStar, GoesAsNearAsItCanToAGoalThatIsWalledIn) {
+  std::vector<std::byte> block(4U << 20U);
+  core::Arena arena(block);
+  RrtStar sut({}, arena);
+  test::BoxView view = aisle();
+  view.occupied.push_back({Vector3(50, -24, 0), Vector3(51, 24, 20)});
+  core::UnlimitedBudget unlimited;
+  PlanResult result;
+  ASSERT_EQ(sut.plan(through_the_aisle(), view, unlimited, result), Status::kOk);
+  EXPECT_FALSE(result.reaches_goal);
+  EXPECT_GT(result.path_W.back().x(), 30.0);
+  EXPECT_LT(result.path_W.back().x(), 50.0);
 }
 
 TEST(RrtStar, StopsAtVolumeAndBudget) {
@@ -157,6 +276,7 @@ TEST(RrtStar, PlanDoesNotAllocate) {
   PlanResult result;
   const test::NoAllocScope scope;
   (void)sut.plan(request_to(Vector3(150, 0, 5)), view, unlimited, result);
+  (void)sut.plan(request_to(Vector3(18, 1, 5)), view, unlimited, result);
   EXPECT_EQ(scope.count(), 0U);
 }
 

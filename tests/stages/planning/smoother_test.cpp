@@ -255,6 +255,20 @@ TEST(Smoother, BrakesWithinTheLimit) {
   EXPECT_EQ(sut.brake(bad, {}, {6.0, 4.0}, t), Status::kInvalidArgument);
 }
 
+TEST(MinimumSnap, RefusesWhatHasNoSolution) {
+  const MinimumSnap sut;
+  Trajectory t;
+  const std::vector<Vector3> knots{Vector3::Zero(), Vector3(3, 1, 0), Vector3(6, 0, 0)};
+  EXPECT_TRUE(sut.solve(knots, std::vector<double>{0.0, 1.0, 1.0}, {}, t));
+  EXPECT_FALSE(sut.solve(knots, std::vector<double>{0.0, 1.0}, {}, t)) << "sizes differ";
+  EXPECT_FALSE(sut.solve(knots, std::vector<double>{0.0, 1.0, 0.0}, {}, t)) << "no time";
+  EXPECT_FALSE(sut.solve(knots, std::vector<double>{0.0, std::nan(""), 1.0}, {}, t));
+  EXPECT_FALSE(sut.solve(std::vector<Vector3>{Vector3::Zero()}, std::vector<double>{0.0}, {}, t));
+  TrajectoryPoint start;
+  start.a_W.x() = std::nan("");
+  EXPECT_FALSE(sut.solve(knots, std::vector<double>{0.0, 1.0, 1.0}, start, t));
+}
+
 TEST(Smoother, SmoothDoesNotAllocate) {
   Smoother sut;
   const test::BoxView view = open_view();

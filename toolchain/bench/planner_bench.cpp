@@ -1,0 +1,299 @@
+// Our RRT* beside OMPL's planners: same space, same checker, same problems. The last line of output is JSON; with
+// --profile N our planner alone solves N problems.
+#include <fmt/format.h>
+#include <ompl/base/OptimizationObjective.h>
+#include <ompl/base/PlannerTerminationCondition.h>
+#include <ompl/geometric/PathGeometric.h>
+#include <ompl/util/Console.h>
+#include <ompl/util/RandomNumbers.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "core/random/counter_rng.hpp"
+#include "stages/planning/ompl_backend/ompl_space.hpp"
+#include "stages/planning/rrt_star.hpp"
+#include "tests/support/box_view.hpp"
+#include "tests/support/no_alloc_scope.hpp"
+
+namespace {
+
+using namespace roborun;
+using namespace roborun::stages;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kRadius_m = 0.9;
+constexpr double kAnytime_s = 0.05;
+constexpr double kWatchdog_s = 0.5;  // of a peer that finds nothing; AITstar of OMPL 1.5.2 hung once
+constexpr std::uint64_t kMaxPolls = 20'000'000;
+constexpr std::uint64_t kProblems = 100;
+
+/// Time of this thread alone: the machine may be shared.
+double cpu_s() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Ends by time and by count; the clock is read at every eighth poll.
+class Deadline {
+ public:
+  explicit Deadline(double span_s) : end_s_(cpu_s() + span_s) {}
+  [[nodiscard]] bool over() {
+    if (++polls_ % 8 == 0) over_ = over_ || polls_ > kMaxPolls || cpu_s() > end_s_;
+    return over_;
+  }
+
+ private:
+  double end_s_;
+  std::uint64_t polls_{0};
+  bool over_{false};
+};
+
+
+struct Problem {
+  test::BoxView view;
+  PlanRequest request;
+};
+
+double on_grid(double x) { return kFinestCell_m * std::round(x / kFinestCell_m); }
+
+/// A field of pillars 1.5 to 4.5 m wide on the 0.3 m grid, one for each 160 m2, the first of them across the straight line.
+Problem problem_of(double length_m, std::uint64_t number) {
+  core::CounterRng rng(number, 60);
+  Problem p;
+  p.view.free_W = {Vector3(-9, -24, 0), Vector3(length_m + 9, 24, 12)};
+  PlanRequest& r = p.request;
+  r.start_W = Vector3(0, 0, 5);
+  r.goal_W = Vector3(length_m, 0, 5);
+  r.bounds_W = {Vector3(-8, -20, 1.5), Vector3(length_m + 8, 20, 10)};
+  r.radius_m = kRadius_m;
+  r.volume_m3 = kInfinity;
+  r.horizon_m = 2.0 * length_m;
+  r.seed = number;
+  const auto count = static_cast<std::size_t>(length_m * 40.0 / 160.0);
+  std::uint64_t lookups = 0;
+  while (p.view.occupied.size() < count) {
+    const double width_m = on_grid(rng.uniform(1.5, 4.5));
+    const double depth_m = on_grid(rng.uniform(1.5, 4.5));
+    const bool first = p.view.occupied.empty();
+    const double x_m = on_grid(first ? rng.uniform(0.2, 0.8) * length_m : rng.uniform(0.0, length_m));
+    const double y_m = on_grid(first ? rng.uniform(-0.4, 0.4) * width_m - 0.5 * width_m : rng.uniform(-24.0, 20.0));
+    p.view.occupied.push_back({Vector3(x_m, y_m, 0.0), Vector3(x_m + depth_m, y_m + width_m, 20.0)});
+    // Room for a start and a stop.
+    if (!p.view.is_free(Aabb::around(r.start_W, 3.0), lookups) || !p.view.is_free(Aabb::around(r.goal_W, 3.0), lookups))
+      p.view.occupied.pop_back();
+  }
+  return p;
+}
+
+class CpuBudget final : public core::StageBudget {
+ public:
+  explicit CpuBudget(double span_s) : deadline_(span_s) {}
+  [[nodiscard]] bool spent(const core::Work&) noexcept override { return deadline_.over(); }
+
+ private:
+  Deadline deadline_;
+};
+
+struct Outcome {
+  double first_s{kInfinity};
+  double cost_m{kInfinity};
+  std::uint64_t allocations{0};  ///< While it planned for 50 ms.
+  std::uint64_t lookups{0};      ///< Boxes checked until the first solution.
+};
+
+class Own {
+ public:
+  Own() : block_(RrtStar::arena_bytes(config())), arena_(block_), planner_(config(), arena_) {}
+  Outcome run(const Problem& p) {
+    Outcome o;
+    PlanRequest first = p.request;
+    first.satisfied_m = kInfinity;
+    core::UnlimitedBudget unlimited;
+    PlanResult result;
+    const double begin_s = cpu_s();
+    const Status status = planner_.plan(first, p.view, unlimited, result);
+    const double end_s = cpu_s();
+    check(p, result);
+    if (status == Status::kOk && result.reaches_goal) o.first_s = end_s - begin_s;
+    o.lookups = result.work.units;
+    CpuBudget budget(kAnytime_s);
+    const test::NoAllocScope scope;
+    (void)planner_.plan(p.request, p.view, budget, result);
+    o.allocations = scope.count();
+    check(p, result);
+    if (result.reaches_goal) o.cost_m = result.cost_m;
+    return o;
+  }
+
+ private:
+  static RrtStar::Config config() {
+    RrtStar::Config c;
+    c.max_nodes = 20000;
+    c.max_samples = 1000000;
+    c.patience = 1000000;
+    return c;
+  }
+  static void check(const Problem& p, const PlanResult& result) {
+    std::uint64_t lookups = 0;
+    double length_m = 0.0;
+    for (std::size_t i = 0; i + 1 < result.path_W.size(); ++i) {
+      length_m += (result.path_W[i + 1] - result.path_W[i]).norm();
+      if (!is_segment_free(p.view, result.path_W[i], result.path_W[i + 1], kRadius_m, lookups)) std::abort();
+    }
+    if (std::fabs(length_m - result.cost_m) > 1e-6) std::abort();
+  }
+  std::vector<std::byte> block_;
+  core::Arena arena_;
+  RrtStar planner_;
+};
+
+struct Hung {};
+
+/// A planner that no longer asks its termination condition still checks motions, and is thrown out of its loop there.
+class WatchedMotions final : public ompl::base::MotionValidator {
+ public:
+  WatchedMotions(ompl::base::SpaceInformation* info, ompl::base::MotionValidatorPtr motions, double span_s)
+      : MotionValidator(info), motions_(std::move(motions)), deadline_(span_s) {}
+  bool checkMotion(const ompl::base::State* a, const ompl::base::State* b) const override {
+    if (deadline_.over()) throw Hung{};
+    return motions_->checkMotion(a, b);
+  }
+  bool checkMotion(const ompl::base::State* a, const ompl::base::State* b,
+                   std::pair<ompl::base::State*, double>& last) const override {
+    if (deadline_.over()) throw Hung{};
+    return motions_->checkMotion(a, b, last);
+  }
+
+ private:
+  ompl::base::MotionValidatorPtr motions_;
+  mutable Deadline deadline_;
+};
+
+/// One solve. Without `anytime`, any solution satisfies the planner: it returns with its first one.
+struct Solve {
+  double time_s{kInfinity};
+  double cost_m{kInfinity};
+  std::uint64_t lookups{0};
+  std::uint64_t allocations{0};
+};
+Solve solve(const std::string& name, const Problem& p, bool anytime) {
+  Solve s;
+  const auto info = make_ompl_space(p.view, p.request.bounds_W, kRadius_m, s.lookups);
+  info->setMotionValidator(
+      std::make_shared<WatchedMotions>(info.get(), info->getMotionValidator(), 4.0 * kWatchdog_s));
+  const auto problem = make_ompl_problem(info, p.request.start_W, p.request.goal_W, kFinestCell_m);
+  if (!anytime) problem->getOptimizationObjective()->setCostThreshold(ompl::base::Cost(kInfinity));
+  const auto planner = allocate_ompl_planner(name, info);
+  planner->setProblemDefinition(problem);
+  planner->setup();
+  s.lookups = 0;
+  Deadline deadline(anytime ? kAnytime_s : kWatchdog_s);
+  const ompl::base::PlannerTerminationCondition stop([&deadline] { return deadline.over(); });
+  const test::NoAllocScope scope;
+  const double begin_s = cpu_s();
+  try {
+    (void)planner->solve(stop);
+  } catch (const Hung&) {
+    fmt::print("{} hung and was stopped by the watchdog\n", name);
+    return s;
+  }
+  const double end_s = cpu_s();
+  s.allocations = scope.count();
+  if (!problem->hasExactSolution()) return s;
+  s.time_s = end_s - begin_s;
+  s.cost_m = problem->getSolutionPath()->length();
+  return s;
+}
+
+Outcome run_peer(const std::string& name, const Problem& p) {
+  const Solve first = solve(name, p, false);
+  const Solve anytime = solve(name, p, true);
+  return {first.time_s, anytime.cost_m, anytime.allocations, first.lookups};
+}
+
+double quantile(std::vector<double> values, double q) {
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(std::ceil(q * static_cast<double>(values.size() - 1)))];
+}
+
+struct Row {
+  double first_median_s, first_p90_s, cost_median_m, cost_p90_m;
+  std::uint64_t allocations{};
+};
+
+Row summary(const std::string& name, const std::vector<Outcome>& outcomes) {
+  std::vector<double> first_s, cost_m, lookups;
+  std::uint64_t allocations = 0;
+  int solved = 0;
+  for (const Outcome& o : outcomes) {
+    first_s.push_back(o.first_s);
+    cost_m.push_back(o.cost_m);
+    lookups.push_back(static_cast<double>(o.lookups));
+    allocations += o.allocations;
+    solved += o.cost_m < kInfinity ? 1 : 0;
+  }
+  const Row row{quantile(first_s, 0.5), quantile(first_s, 0.9), quantile(cost_m, 0.5), quantile(cost_m, 0.9), allocations};
+  fmt::print("{:<16} {:>10.3f} {:>10.3f} {:>10.0f} {:>10.2f} {:>10.2f} {:>8} {:>14.0f}\n", name, 1e3 * row.first_median_s,
+             1e3 * row.first_p90_s, quantile(lookups, 0.5), row.cost_median_m, row.cost_p90_m, solved,
+             static_cast<double>(allocations) / static_cast<double>(outcomes.size()) / kAnytime_s);
+  std::fflush(stdout);
+  return row;
+}
+
+int profile(std::uint64_t count) {
+  Own own;
+  for (std::uint64_t n = 0; n < count; ++n) (void)own.run(problem_of(n % 2 == 0 ? 60.0 : 150.0, n));
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc == 3 && std::strcmp(argv[1], "--profile") == 0) return profile(std::strtoull(argv[2], nullptr, 10));
+  const std::uint64_t problems =
+      argc >= 3 && std::strcmp(argv[1], "--problems") == 0 ? std::strtoull(argv[2], nullptr, 10) : kProblems;
+  ompl::msg::setLogLevel(ompl::msg::LOG_NONE);
+  ompl::RNG::setSeed(20210);
+  double speedup_median = kInfinity, speedup_p90 = kInfinity, vs_connect = 0.0, cost_median = 0.0, cost_p90 = 0.0;
+  std::uint64_t allocations = 0;
+  for (const double length_m : {60.0, 150.0}) {
+    std::vector<Problem> set;
+    for (std::uint64_t n = 0; n < problems; ++n) set.push_back(problem_of(length_m, n));
+    fmt::print("{} problems of {:.0f} m\n{:<16} {:>10} {:>10} {:>10} {:>10} {:>10} {:>8} {:>14}\n", problems, length_m,
+               "", "first ms", "p90", "boxes", "50 ms: m", "p90", "solved", "allocations/s");
+    std::vector<Outcome> outcomes;
+    Own own;
+    for (const Problem& p : set) outcomes.push_back(own.run(p));
+    const Row ours = summary("roborun", outcomes);
+    allocations += ours.allocations;
+    double best_median_m = kInfinity, best_p90_m = kInfinity;
+    for (const std::string name : {"RRTstar", "InformedRRTstar", "BITstar", "ABITstar", "AITstar", "RRTConnect"}) {
+      outcomes.clear();
+      for (const Problem& p : set) outcomes.push_back(run_peer(name, p));
+      const Row row = summary(name, outcomes);
+      best_median_m = std::fmin(best_median_m, row.cost_median_m);
+      best_p90_m = std::fmin(best_p90_m, row.cost_p90_m);
+      if (name == "RRTstar") {
+        speedup_median = std::fmin(speedup_median, row.first_median_s / ours.first_median_s);
+        speedup_p90 = std::fmin(speedup_p90, row.first_p90_s / ours.first_p90_s);
+      }
+      if (name == "RRTConnect") vs_connect = std::fmax(vs_connect, ours.first_median_s / row.first_median_s);
+    }
+    cost_median = std::fmax(cost_median, ours.cost_median_m / best_median_m);
+    cost_p90 = std::fmax(cost_p90, ours.cost_p90_m / best_p90_m);
+  }
+  // Each figure is the worse of the two distances.
+  fmt::print(R"({{"first_solution_speedup_rrtstar_median":{:.2f},"first_solution_speedup_rrtstar_p90":{:.2f},)"
+             R"("first_solution_vs_rrtconnect":{:.3f},"cost_50ms_vs_best_median":{:.4f},"cost_50ms_vs_best_p90":{:.4f},)"
+             R"("allocations":{}}})" "\n",
+             speedup_median, speedup_p90, vs_connect, cost_median, cost_p90, allocations);
+  return 0;
+}
