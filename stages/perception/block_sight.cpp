@@ -276,7 +276,7 @@ HWY_INLINE Node node_of(const SightCameras& cameras, const SightBlock& block) {
   return node;
 }
 
-EightSeen SeeBlocks(const SightCameras& cameras, int level, const std::array<Vector3, 8>& center_W) {
+EightSeen see_blocks_lanes(const SightCameras& cameras, int level, const std::array<Vector3, 8>& center_W) {
   Lanes at[kMaxCameras];
   for (std::size_t k = 0; k < cameras.count; ++k) {
     for (std::size_t i = 0; i < 8; ++i) {
@@ -292,7 +292,7 @@ EightSeen SeeBlocks(const SightCameras& cameras, int level, const std::array<Vec
   return summary(combined, all);
 }
 
-EightSeen SeeChildren(const SightCameras& cameras, const SightBlock& parent) {
+EightSeen see_children_lanes(const SightCameras& cameras, const SightBlock& parent) {
   Lanes at[kMaxCameras];
   const Node node = node_of(cameras, parent);
   place_children(cameras, node, at);
@@ -301,7 +301,7 @@ EightSeen SeeChildren(const SightCameras& cameras, const SightBlock& parent) {
   return summary(combined, node.cameras);
 }
 
-void SeeBrick(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) {
+void see_brick_lanes(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) {
   // Depth first: at most seven siblings wait on each of four levels.
   std::array<Node, 29> stack;
   Lanes at[kMaxCameras];
@@ -338,7 +338,7 @@ void SeeBrick(const SightCameras& cameras, const SightBlock& brick, int finest, 
   }
 }
 
-void EndCells(const PixelLine& line, std::span<const float> depth_m, float range_m, SurfaceRow& row) {
+void end_cells_lanes(const PixelLine& line, std::span<const float> depth_m, float range_m, SurfaceRow& row) {
   const Floats d;
   const Ints di;
   constexpr float kBias = 4096.0F;  // makes truncation round down
@@ -389,8 +389,8 @@ void EndCells(const PixelLine& line, std::span<const float> depth_m, float range
   }
 }
 
-std::size_t DepthSteps(std::span<const float> depth_m, float range_m, float steps_per_m,
-                       DepthPyramid::Entry* entry) {
+std::size_t depth_steps_lanes(std::span<const float> depth_m, float range_m, float steps_per_m,
+                              DepthPyramid::Entry* entry) {
   const Floats d;
   const Ints di;
   const auto range = hn::Set(d, range_m);
@@ -421,8 +421,8 @@ std::size_t DepthSteps(std::span<const float> depth_m, float range_m, float step
   return lost;
 }
 
-void LeastOfFour(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride,
-                 std::size_t count, DepthPyramid::Entry* to) {
+void least_of_four_lanes(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below,
+                         std::size_t stride, std::size_t count, DepthPyramid::Entry* to) {
   const auto least = [](DepthPyramid::Entry a, DepthPyramid::Entry b) {
     return DepthPyramid::Entry{std::min(a.least_steps, b.least_steps),
                                std::min(a.not_most_steps, b.not_most_steps)};
@@ -445,7 +445,7 @@ void LeastOfFour(const DepthPyramid::Entry* above, const DepthPyramid::Entry* be
   }
 }
 
-std::size_t BrickFlags(const std::int8_t* cell, std::uint8_t* mip) {
+std::size_t brick_flags_lanes(const std::int8_t* cell, std::uint8_t* mip) {
   std::size_t unknown = 0;
   std::size_t i = 0;
 #if HWY_TARGET != HWY_SCALAR
@@ -485,13 +485,13 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace roborun::stages {
 
-HWY_EXPORT(SeeBlocks);
-HWY_EXPORT(SeeChildren);
-HWY_EXPORT(SeeBrick);
-HWY_EXPORT(EndCells);
-HWY_EXPORT(DepthSteps);
-HWY_EXPORT(LeastOfFour);
-HWY_EXPORT(BrickFlags);
+HWY_EXPORT(see_blocks_lanes);
+HWY_EXPORT(see_children_lanes);
+HWY_EXPORT(see_brick_lanes);
+HWY_EXPORT(end_cells_lanes);
+HWY_EXPORT(depth_steps_lanes);
+HWY_EXPORT(least_of_four_lanes);
+HWY_EXPORT(brick_flags_lanes);
 
 void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& image,
                           const Margin& depth_margin) noexcept {
@@ -526,34 +526,34 @@ void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& imag
 
 EightSeen see_blocks(const SightCameras& cameras, int level,
                      const std::array<Vector3, 8>& center_W) noexcept {
-  return HWY_DYNAMIC_DISPATCH(SeeBlocks)(cameras, level, center_W);
+  return HWY_DYNAMIC_DISPATCH(see_blocks_lanes)(cameras, level, center_W);
 }
 
 EightSeen see_children(const SightCameras& cameras, const SightBlock& parent) noexcept {
-  return HWY_DYNAMIC_DISPATCH(SeeChildren)(cameras, parent);
+  return HWY_DYNAMIC_DISPATCH(see_children_lanes)(cameras, parent);
 }
 
 void see_brick(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) noexcept {
-  HWY_DYNAMIC_DISPATCH(SeeBrick)(cameras, brick, finest, seen);
+  HWY_DYNAMIC_DISPATCH(see_brick_lanes)(cameras, brick, finest, seen);
 }
 
 void end_cells(const PixelLine& line, std::span<const float> depth_m, float range_m,
                SurfaceRow& row) noexcept {
-  HWY_DYNAMIC_DISPATCH(EndCells)(line, depth_m, range_m, row);
+  HWY_DYNAMIC_DISPATCH(end_cells_lanes)(line, depth_m, range_m, row);
 }
 
 std::size_t depth_steps(std::span<const float> depth_m, float range_m, float steps_per_m,
                         DepthPyramid::Entry* entry) noexcept {
-  return HWY_DYNAMIC_DISPATCH(DepthSteps)(depth_m, range_m, steps_per_m, entry);
+  return HWY_DYNAMIC_DISPATCH(depth_steps_lanes)(depth_m, range_m, steps_per_m, entry);
 }
 
 void least_of_four(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride,
                    std::size_t count, DepthPyramid::Entry* to) noexcept {
-  HWY_DYNAMIC_DISPATCH(LeastOfFour)(above, below, stride, count, to);
+  HWY_DYNAMIC_DISPATCH(least_of_four_lanes)(above, below, stride, count, to);
 }
 
 std::size_t brick_flags(const std::array<std::int8_t, kCellsPerBrick>& cell, std::uint8_t* mip) noexcept {
-  return HWY_DYNAMIC_DISPATCH(BrickFlags)(cell.data(), mip);
+  return HWY_DYNAMIC_DISPATCH(brick_flags_lanes)(cell.data(), mip);
 }
 
 std::int64_t sight_instruction_sets() noexcept { return hwy::SupportedTargets(); }
