@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <csignal>
 
 #include "platform/app/arguments.hpp"
@@ -112,7 +113,7 @@ class Forecast {
 
 std::string clock_of(double s) {
   if (s < 0.0) return "?";
-  const auto whole = static_cast<int>(s + 0.5);
+  const auto whole = std::lround(s);
   return fmt::format("{}:{:02}", whole / 60, whole % 60);
 }
 

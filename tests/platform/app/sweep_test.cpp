@@ -62,6 +62,9 @@ TEST(Sweep, HasTheSameBytesWithOneJobWithTwoAndFromShards) {
   const auto one = files_of(sweep_into("one", small_plan(), 1));
   ASSERT_EQ(std::count(one.at("results.jsonl").begin(), one.at("results.jsonl").end(), '\n'), 8);
   EXPECT_EQ(one.count("flight_aware.json"), 1U);
+  const std::string& page = one.at("report.html");
+  EXPECT_NE(page.find("</svg>"), std::string::npos);
+  for (const char* outside : {"href", "<script", "src="}) EXPECT_EQ(page.find(outside), std::string::npos);
   EXPECT_EQ(files_of(sweep_into("two", small_plan(), 2)), one);
 
   std::vector<std::string> shards;
