@@ -301,6 +301,7 @@ std::string overall_svg(const std::vector<SweepRow>& rows) {
        {"CPU time a decision, s", [](const DesignSummary& s) { return s.cpu_s_per_decision; }, nullptr}}};
   Svg svg;
   std::vector<std::string> names;
+  names.reserve(summaries.size());
   for (const DesignSummary& s : summaries)
     names.push_back(fmt::format("{}, {}: {} of {} reached, {} collided", s.design, s.profile, s.reached,
                                 s.missions, s.collided));
