@@ -105,8 +105,11 @@ void Children::collect(int timeout_ms, std::vector<Child>& ended) {
     int status = 0;
     (void)close(running_[i].fd);
     running_[i].fd = -1;
-    (void)waitpid(running_[i].pid, &status, 0);
-    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) running_[i].sent.clear();
+    pid_t waited = 0;
+    do {
+      waited = waitpid(running_[i].pid, &status, 0);
+    } while (waited < 0 && errno == EINTR);
+    if (waited < 0 || !WIFEXITED(status) || WEXITSTATUS(status) != 0) running_[i].sent.clear();
     ended.push_back(running_[i]);
   }
   std::erase_if(running_, [](const Child& child) { return child.fd < 0; });

@@ -70,5 +70,23 @@ for signal in INT KILL; do
 done
 check "one JSON object" test "$(sweep --out "$folder/whole" --json | tee "$folder/json" | wc -l)" -eq 1
 check "its designs" grep -q '"designs":{"aware":{"missions":2,' "$folder/json"
+cat >"$folder/board.toml" <<'BOARD'
+[board]
+machine = "a board"
+per_unit_s = [1e-7, 0, 1e-7, 1e-7, 1e-7, 1e-7]
+[map]
+mean = [0, 0, 1e-6, 1, 1e-6, 0.01]
+p99 = [0, 0, 1e-6, 1, 2e-6, 0.02]
+[export]
+mean = [0, 0, 0, 1, 1e-7, 0.001]
+p99 = [0, 0, 0, 1, 2e-7, 0.002]
+[planner]
+mean = [0, 0, 0, 1, 1e-6, 0.01]
+p99 = [0, 0, 0, 1, 2e-6, 0.02]
+BOARD
+"$roborun" sweep --environments 1 --designs aware --settings "$folder/short.toml" --profile "paper,$folder/board.toml" \
+  --out "$folder/boards" --json >"$folder/json" 2>/dev/null
+check "a board file is a profile" grep -q '"profiles":{"paper":{"aware":.*},"board":{"aware":{"missions":1,' "$folder/json"
+check "each profile has its picture" test -s "$folder/boards/sensitivity_board.svg"
 echo "$passed passed, $failed failed"
-[[ $failed -eq 0 && $passed -ge 28 ]]
+[[ $failed -eq 0 && $passed -ge 32 ]]
