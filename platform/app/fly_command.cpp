@@ -6,13 +6,14 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <vector>
 
+#include "platform/app/arguments.hpp"
 #include "platform/app/board_profile.hpp"
 #include "platform/app/mission.hpp"
 #include "platform/app/progress_line.hpp"
+#include "platform/app/scene.hpp"
 #include "platform/app/settings_file.hpp"
 #include "platform/report/svg_plot.hpp"
 #include "platform/report/table.hpp"
@@ -46,45 +47,6 @@ struct Options {
   bool json{false};
 };
 
-std::vector<std::string> split(const std::string& text) {
-  std::vector<std::string> parts;
-  std::istringstream stream(text);
-  for (std::string part; std::getline(stream, part, ',');) parts.push_back(part);
-  if (text.empty() || text.back() == ',') parts.emplace_back();  // getline drops an empty last one
-  return parts;
-}
-
-governor::Design design_of(const std::string& name) {
-  for (const auto design :
-       {governor::Design::kAware, governor::Design::kStatic, governor::Design::kStaticFair}) {
-    if (name == governor::to_string(design)) return design;
-  }
-  throw InputError(fmt::format(
-      "--design: unknown design '{}': must be aware, static, static-fair, or several with commas between",
-      name));
-}
-
-sitl::Mission mission_of(const std::string& name) {
-  if (name == "package_delivery") return sitl::Mission::kPackageDelivery;
-  if (name == "search_and_rescue") return sitl::Mission::kSearchAndRescue;
-  throw InputError(
-      fmt::format("--mission: unknown mission '{}': must be package_delivery or search_and_rescue", name));
-}
-
-std::uint64_t seed_of(const std::string& text) {
-  std::size_t used = 0;
-  std::uint64_t seed = 0;
-  try {
-    if (!text.empty() && text[0] >= '0' && text[0] <= '9') seed = std::stoull(text, &used);
-  } catch (const std::exception&) {
-    used = 0;
-  }
-  if (used == 0 || used != text.size())
-    throw InputError(fmt::format(
-        "--seed: '{}' is not a seed: must be a whole number from 0 to 18446744073709551615", text));
-  return seed;
-}
-
 std::optional<Vector3> point_of(const char* option, const std::string& text) {
   if (text.empty()) return std::nullopt;
   const std::vector<std::string> parts = split(text);
@@ -113,54 +75,12 @@ Profile profile_of(const Options& options) {
   return profile;
 }
 
-report::Scene scene_of(const sitl::World& world, const std::string& title, double zone_m) {
-  report::Scene scene;
-  scene.title = title;
-  scene.bounds_W = world.bounds_W();
-  scene.start_W = world.start_W();
-  scene.goal_W = world.goal_W();
-  for (const sitl::Pillar& p : world.pillars()) scene.circles.push_back({p.x_m, p.y_m, p.radius_m});
-  for (const Aabb& b : world.boxes())
-    scene.rects.push_back({b.min_W.x(), b.min_W.y(), b.size().x(), b.size().y()});
-  if (zone_m > 0.0) scene.zone_borders_m = {world.start_W().x() + zone_m, world.goal_W().x() - zone_m};
-  const sitl::VoxelGrid& voxels = world.voxels();
-  if (!voxels.empty()) {
-    // Columns with something at flight height, as runs along x.
-    const Aabb box = voxels.bounds_W();
-    const double step_m = std::max(voxels.cell_m(), box.size().x() / 400.0);
-    for (double y_m = box.min_W.y() + 0.5 * step_m; y_m < box.max_W.y(); y_m += step_m) {
-      double run_m = 0.0;
-      for (double x_m = box.min_W.x() + 0.5 * step_m; x_m < box.max_W.x() + step_m; x_m += step_m) {
-        if (voxels.occupied(Vector3(x_m, y_m, world.start_W().z()))) {
-          run_m += step_m;
-        } else if (run_m > 0.0) {
-          scene.rects.push_back({x_m - 0.5 * step_m - run_m, y_m - 0.5 * step_m, run_m, step_m});
-          run_m = 0.0;
-        }
-      }
-    }
-    return scene;
-  }
-  const Vector3 size = scene.bounds_W.size();
-  scene.heat_cell_m = std::max(10.0, size.x() / 150.0);
-  scene.heat_columns = static_cast<int>(size.x() / scene.heat_cell_m);
-  scene.heat_rows = static_cast<int>(size.y() / scene.heat_cell_m);
-  for (int k = 0; k < scene.heat_rows; ++k) {
-    for (int i = 0; i < scene.heat_columns; ++i) {
-      scene.heat_ratio.push_back(
-          world.congestion_ratio(scene.bounds_W.min_W.x() + (i + 0.5) * scene.heat_cell_m,
-                                 scene.bounds_W.min_W.y() + (k + 0.5) * scene.heat_cell_m));
-    }
-  }
-  return scene;
-}
-
 int fly(const Options& options) {
   // Everything is checked before the first metre is flown.
   std::vector<governor::Design> designs;
-  for (const std::string& name : split(options.design)) designs.push_back(design_of(name));
+  for (const std::string& name : split(options.design)) designs.push_back(design_of("--design", name));
   const sitl::Mission mission = mission_of(options.mission);
-  const std::uint64_t seed = seed_of(options.seed);
+  const std::uint64_t seed = seed_of("--seed", options.seed);
   if (options.colour != "speed" && options.colour != "precision") {
     throw InputError(fmt::format("--color: unknown colour '{}': must be speed or precision", options.colour));
   }

@@ -1,0 +1,52 @@
+#include "platform/app/arguments.hpp"
+
+#include <fmt/format.h>
+
+#include <sstream>
+
+#include "platform/sitl/world/input_error.hpp"
+
+namespace roborun::app {
+
+using sitl::InputError;
+
+std::vector<std::string> split(const std::string& text) {
+  std::vector<std::string> parts;
+  std::istringstream stream(text);
+  for (std::string part; std::getline(stream, part, ',');) parts.push_back(part);
+  if (text.empty() || text.back() == ',') parts.emplace_back();  // getline drops an empty last one
+  return parts;
+}
+
+governor::Design design_of(const char* option, const std::string& name) {
+  for (const auto design :
+       {governor::Design::kAware, governor::Design::kStatic, governor::Design::kStaticFair}) {
+    if (name == governor::to_string(design)) return design;
+  }
+  throw InputError(fmt::format(
+      "{}: unknown design '{}': must be aware, static, static-fair, or several with commas between", option,
+      name));
+}
+
+sitl::Mission mission_of(const std::string& name) {
+  if (name == "package_delivery") return sitl::Mission::kPackageDelivery;
+  if (name == "search_and_rescue") return sitl::Mission::kSearchAndRescue;
+  throw InputError(
+      fmt::format("--mission: unknown mission '{}': must be package_delivery or search_and_rescue", name));
+}
+
+std::uint64_t seed_of(const char* option, const std::string& text) {
+  std::size_t used = 0;
+  std::uint64_t seed = 0;
+  try {
+    if (!text.empty() && text[0] >= '0' && text[0] <= '9') seed = std::stoull(text, &used);
+  } catch (const std::exception&) {
+    used = 0;
+  }
+  if (used == 0 || used != text.size())
+    throw InputError(fmt::format(
+        "{}: '{}' is not a seed: must be a whole number from 0 to 18446744073709551615", option, text));
+  return seed;
+}
+
+}  // namespace roborun::app

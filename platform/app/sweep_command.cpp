@@ -1,0 +1,238 @@
+#include "platform/app/sweep_command.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <set>
+#include <thread>
+
+#include "core/record/state_hash.hpp"
+#include "platform/app/arguments.hpp"
+#include "platform/app/settings_file.hpp"
+#include "platform/app/sweep_run.hpp"
+#include "platform/sitl/world/generator.hpp"
+#include "platform/sitl/world/input_error.hpp"
+
+namespace roborun::app {
+namespace {
+
+using sitl::InputError;
+
+struct Options {
+  std::string suite{"paper27"};
+  std::string environments;
+  std::string mission{"package_delivery"};
+  std::string designs{"aware,static,static-fair"};
+  std::string profiles{"paper"};
+  std::string seeds{"1"};
+  std::string map{"own"};
+  std::string planner{"own"};
+  std::string settings;
+  std::string jobs{std::to_string(std::max(1U, std::thread::hardware_concurrency()))};
+  std::string shard{"1/1"};
+  std::string out{"out/sweep"};
+  bool json{false};
+  std::vector<std::string> merged;
+};
+
+std::string read_file(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::optional<int> whole_number(const std::string& text, int low, int high) {
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size() || value < low || value > high)
+    return std::nullopt;
+  return value;
+}
+
+template <typename T>
+void refuse_twice(const char* option, const std::vector<T>& values) {
+  std::set<T> seen;
+  for (const T& value : values) {
+    if (!seen.insert(value).second) throw InputError(fmt::format("{}: {} is given twice", option, value));
+  }
+}
+
+std::string profile_digest(const Profile& profile) {
+  core::StateHash hash;
+  for (const core::StageCost& cost : profile.costs.stage) {
+    for (const double s : cost.fixed_s) hash.add(s);
+    for (const double s : cost.per_m3_s) hash.add(s);
+    hash.add(cost.per_unit_s);
+  }
+  for (const governor::LatencyModel& model : profile.model) {
+    for (const double s : model.fixed_s) hash.add(s);
+    for (const double s : model.slope_s_per_m3) hash.add(s);
+  }
+  return fmt::format("{:016x}", hash.value());
+}
+
+void set_shard(const std::string& text, SweepPlan& plan) {
+  constexpr int kMost = 10000;
+  const std::size_t slash = text.find('/');
+  const auto count =
+      slash == std::string::npos ? std::nullopt : whole_number(text.substr(slash + 1), 1, kMost);
+  const auto index = count ? whole_number(text.substr(0, slash), 1, *count) : std::nullopt;
+  if (!index)
+    throw InputError(fmt::format(
+        "--shard: '{}' is not a shard: must be I/N with 1 <= I <= N <= {}, as in 2/4", text, kMost));
+  plan.shard = *index;
+  plan.shards = *count;
+}
+
+SweepPlan plan_of(const Options& options, SweepInputs& inputs) {
+  SweepPlan plan;
+  if (options.suite != plan.suite)
+    throw InputError(fmt::format("--suite: unknown suite '{}': must be paper27", options.suite));
+  (void)mission_of(options.mission);
+  plan.mission = options.mission;
+  if (options.environments.empty()) {
+    for (int number = 1; number <= 27; ++number) plan.environments.push_back(number);
+  } else {
+    for (const std::string& name : split(options.environments))
+      plan.environments.push_back(sitl::environment(name).number);
+  }
+  std::sort(plan.environments.begin(), plan.environments.end());
+  plan.designs = split(options.designs);
+  for (const std::string& name : plan.designs) (void)design_of("--designs", name);
+  for (const std::string& text : split(options.seeds)) plan.seeds.push_back(seed_of("--seeds", text));
+  refuse_twice("--environments", plan.environments);
+  refuse_twice("--designs", plan.designs);
+  refuse_twice("--seeds", plan.seeds);
+  set_shard(options.shard, plan);
+  plan.map = options.map;
+  plan.planner = options.planner;
+  if (!options.settings.empty()) {
+    load_settings(options.settings, inputs.base);
+    plan.settings = digest_of(read_file(options.settings));
+  }
+  std::vector<std::string> names;
+  for (const std::string& text : split(options.profiles)) {
+    const Profile profile = load_profile(text);
+    // Machines of a cluster keep the same file in different folders.
+    const std::string name =
+        text == "paper" || text == "host" ? text : std::filesystem::path(text).stem().string();
+    names.push_back(name);
+    plan.profiles.push_back({name, profile_digest(profile)});
+    inputs.profile[name] = profile;
+  }
+  refuse_twice("--profile", names);
+  plan.build = digest_of(read_file("/proc/self/exe"));
+  return plan;
+}
+
+void tell(const SweepStore& store, const Options& options) {
+  const std::vector<report::SweepRow> rows = rows_of(store);
+  const SweepPlan& plan = store.plan();
+  // The report is of the whole sweep: `merge` writes it for shards.
+  const bool report = plan.shards == 1 && !rows.empty();
+  if (report) write_sweep_report(store);
+  if (options.json) {
+    fmt::print("{}\n", report::sweep_json(plan.suite, rows, store.complete()));
+    return;
+  }
+  fmt::print("{}", report::sweep_table(rows));
+  if (!store.complete())
+    fmt::print("{} of {} missions are missing\n", store.missions().size() - rows.size(),
+               store.missions().size());
+  if (report) fmt::print("report: {}/report.html\n", store.folder());
+}
+
+int sweep(const Options& options) {
+  SweepInputs inputs;
+  const SweepPlan plan = plan_of(options, inputs);
+  const auto jobs = whole_number(options.jobs, 1, 1024);
+  if (!jobs)
+    throw InputError(
+        fmt::format("--jobs: '{}' is out of range: must be a whole number from 1 to 1024", options.jobs));
+  try_sweep(plan, inputs);
+  SweepStore store(options.out, plan);
+  const bool complete = fly_sweep(store, inputs, *jobs);
+  tell(store, options);
+  if (!complete)
+    fmt::print(stderr, "roborun: stopped; what was flown is kept: the same command goes on from there\n");
+  return complete ? 0 : 1;
+}
+
+int merge(const Options& options) {
+  merge_shards(options.merged, options.out);
+  const SweepStore store(options.out, plan_of_folder(options.out));
+  tell(store, options);
+  return store.complete() ? 0 : 1;
+}
+
+void add_merge_command(CLI::App& sweep_app, const std::shared_ptr<Options>& options,
+                       std::function<int()>& run) {
+  CLI::App* merge_app =
+      sweep_app.add_subcommand("merge", "Make one sweep of the folders that --shard runs wrote");
+  merge_app->footer(
+      "Example:\n"
+      "  roborun sweep merge out/shard-1 out/shard-2 --out out/whole\n\n"
+      "The folder --out is what one run without --shard would have written, byte for byte; missions that no "
+      "shard\nhas are flown by that run with the same --out. Exit code: 0 complete, 1 missions missing, 2 "
+      "bad "
+      "input.");
+  merge_app->add_option("folders", options->merged, "Folders of the shards")->required();
+  merge_app->add_option("--out", options->out, "Folder of the whole")->required();
+  merge_app->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
+  merge_app->callback([options, &run] { run = [options] { return merge(*options); }; });
+}
+
+}  // namespace
+
+void add_sweep_command(CLI::App& app, std::function<int()>& run) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* sweep_app = app.add_subcommand(
+      "sweep", "Fly the paper's whole evaluation: environments x profiles x designs x seeds, in parallel");
+  sweep_app->footer(
+      "Examples:\n"
+      "  roborun sweep                                      27 environments, three designs, one seed\n"
+      "  roborun sweep --seeds 1,2,3,4 --designs aware      collisions and intervals of one design\n"
+      "  roborun sweep --environments 1,14,27 --profile paper,out/board.toml\n"
+      "  roborun sweep --shard 2/4 --out out/shard-2        the second quarter, on another machine\n"
+      "  roborun sweep merge out/shard-* --out out/whole\n\n"
+      "The folder --out holds request.json, results.jsonl (one line a mission) and report.html (tables and\n"
+      "pictures, opens offline). Stopped by Ctrl-C or power loss, the same command goes on. Results do not\n"
+      "depend on --jobs, machine or order.\n"
+      "Exit code: 0 every mission was flown (whether it reached the goal is in the table), 1 stopped before "
+      "that,\n2 bad input.");
+  sweep_app->add_option("--suite", options->suite, "Set of environments: paper27")->capture_default_str();
+  sweep_app->add_option("--environments", options->environments,
+                        "Only these of the suite, by number or name, with commas [all]");
+  sweep_app->add_option("--mission", options->mission, "package_delivery or search_and_rescue")
+      ->capture_default_str();
+  sweep_app->add_option("--designs", options->designs, "Any of aware, static, static-fair, with commas")
+      ->capture_default_str();
+  sweep_app
+      ->add_option("--profile", options->profiles,
+                   "What computing costs: paper, host, files of roborun calibrate; several with commas")
+      ->capture_default_str();
+  sweep_app->add_option("--seeds", options->seeds, "Whole numbers with commas")->capture_default_str();
+  sweep_app->add_option("--map", options->map, "own or octomap")->capture_default_str();
+  sweep_app
+      ->add_option("--planner", options->planner,
+                   "own, ompl:RRTstar, ompl:InformedRRTstar, ompl:RRTConnect, ompl:BITstar")
+      ->capture_default_str();
+  sweep_app->add_option("--settings", options->settings,
+                        "Cameras, wind, battery, speed from a TOML file (see platform/README.md)");
+  sweep_app->add_option("--jobs", options->jobs, "Missions at a time, 1 .. 1024")->capture_default_str();
+  sweep_app->add_option("--shard", options->shard, "I/N: only the I-th of N equal parts")
+      ->capture_default_str();
+  sweep_app->add_option("--out", options->out, "Folder of the results")->capture_default_str();
+  sweep_app->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
+  add_merge_command(*sweep_app, options, run);
+  sweep_app->callback([options, &run, sweep_app] {
+    if (sweep_app->get_subcommands().empty()) run = [options] { return sweep(*options); };
+  });
+}
+
+}  // namespace roborun::app

@@ -1,0 +1,60 @@
+#include "platform/report/result_line.hpp"
+
+#include <limits>
+#include <nlohmann/json.hpp>
+
+namespace roborun::report {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double number(const Json& json) {
+  return json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
+}
+
+}  // namespace
+
+std::string to_line(const MissionResult& result) {
+  Json json = Json::parse(to_json(result));
+  json.erase("real_time_factor");
+  return json.dump();
+}
+
+std::optional<MissionResult> from_line(const std::string& line) {
+  try {
+    const Json json = Json::parse(line);
+    MissionResult r;
+    r.design = json.at("design");
+    r.profile = json.at("profile");
+    r.env = json.at("env");
+    r.seed = json.at("seed");
+    r.reached_goal = json.at("reached_goal");
+    r.collided = json.at("collided");
+    r.mission_time_s = number(json.at("mission_time_s"));
+    r.distance_m = number(json.at("distance_m"));
+    r.mean_velocity_mps = number(json.at("mean_velocity_mps"));
+    r.max_velocity_mps = number(json.at("max_velocity_mps"));
+    r.energy_kJ = number(json.at("energy_kJ"));
+    r.decisions = json.at("decisions");
+    r.deadline_misses = json.at("deadline_misses");
+    const Json& latency = json.at("latency_s");
+    r.latency_s = {number(latency.at("median")), number(latency.at("p99")), number(latency.at("max"))};
+    r.cpu_s = number(json.at("cpu_s"));
+    r.cpu_utilization_ratio = number(json.at("cpu_utilization_ratio"));
+    const Json& precision = json.at("precision_m");
+    r.precision_m = {number(precision.at("min")), number(precision.at("median")),
+                     number(precision.at("max"))};
+    r.map_bytes = json.at("map_bytes");
+    r.state_hash = json.at("state_hash");
+    r.map = json.at("map");
+    r.planner = json.at("planner");
+    r.mission = json.at("mission");
+    r.reason = json.at("reason");
+    r.speed_limit_mps = number(json.at("speed_limit_mps"));
+    return r;
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace roborun::report

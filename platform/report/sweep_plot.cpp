@@ -1,0 +1,397 @@
+#include "platform/report/sweep_plot.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "platform/report/svg.hpp"
+
+namespace roborun::report {
+namespace {
+
+constexpr const char* kGrid = "#e4e7eb";
+constexpr std::array<const char*, 6> kDesignColour{"#0072b2", "#d55e00", "#009e73",
+                                                   "#cc79a7", "#e69f00", "#56b4e9"};
+constexpr std::array<const char*, core::kStageCount> kStageColour{"#7b8794", "#cc79a7", "#0072b2",
+                                                                  "#56b4e9", "#e69f00", "#009e73"};
+
+const char* colour_of(std::size_t design) { return kDesignColour[design % kDesignColour.size()]; }
+
+/// A step of 1, 2 or 5 times a power of ten that gives at most `parts` parts.
+double nice_step(double span, double parts) {
+  const double raw = span / parts;
+  const double power = std::pow(10.0, std::floor(std::log10(raw)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * power >= raw) return factor * power;
+  }
+  return 10.0 * power;
+}
+
+/// A rectangle with a scale from low (bottom) to high (top).
+struct Panel {
+  double left, top, width, height;
+  double low, high;
+  bool logarithmic;
+
+  [[nodiscard]] double y(double value) const {
+    const double ratio = logarithmic ? std::log(std::max(value, low) / low) / std::log(high / low)
+                                     : (value - low) / (high - low);
+    return top + height * (1.0 - std::clamp(ratio, 0.0, 1.0));
+  }
+  void tick(Svg& svg, double value) const {
+    svg.add(R"(<line x1="{0:.1f}" x2="{1:.1f}" y1="{2:.1f}" y2="{2:.1f}" stroke="{3}"/>)", left, left + width,
+            y(value), kGrid);
+    svg.text(left - 6, y(value) + 4, fmt::format("{:g}", value), "end", 11, kSoft);
+  }
+  void draw(Svg& svg, const std::string& title) const {
+    svg.text(left, top - 8, title, "start", 13, kInk, "bold");
+    if (logarithmic) {
+      for (double power = std::pow(10.0, std::floor(std::log10(low))); power <= high * 1.001; power *= 10.0) {
+        for (const double factor : {1.0, 2.0, 5.0}) {
+          if (factor * power >= low * 0.999 && factor * power <= high * 1.001) tick(svg, factor * power);
+        }
+      }
+    } else {
+      const double step = nice_step(high - low, 4.0);
+      for (int i = 0; low + i * step <= high * 1.001; ++i) tick(svg, low + i * step);
+    }
+    svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="none" stroke="#cbd2d9"/>)",
+            left, top, width, height);
+  }
+  void whisker(Svg& svg, double x, const Estimate& e) const {
+    if (!std::isfinite(e.half_95)) return;
+    const double upper = y(e.mean + e.half_95);
+    const double lower = y(e.mean - e.half_95);
+    svg.add(
+        R"(<path d="M {0:.1f} {1:.1f} V {2:.1f} M {3:.1f} {1:.1f} H {4:.1f} M {3:.1f} {2:.1f} H {4:.1f}" stroke="{5}" stroke-width="1.4" fill="none"/>)",
+        x, upper, lower, x - 5.0, x + 5.0, kInk);
+  }
+};
+
+std::string three_digits(double value) {
+  if (!std::isfinite(value)) return "-";
+  return value >= 100.0 ? fmt::format("{:.0f}", value) : fmt::format("{:.3g}", value);
+}
+
+double velocity(const MissionResult& r) { return r.mean_velocity_mps; }
+double mission_time(const MissionResult& r) { return r.mission_time_s; }
+double energy(const MissionResult& r) { return r.energy_kJ; }
+
+/// What a chart shows of a design.
+struct Bar {
+  std::string title;
+  Estimate (*value)(const DesignSummary&);
+  double (*printed)(const Published&);  ///< Null: nothing was printed.
+};
+
+void draw_bars(Svg& svg, const std::vector<DesignSummary>& summaries, const Bar& bar, double left,
+               double top) {
+  double high = 1e-9;
+  for (const DesignSummary& s : summaries) {
+    const Estimate e = bar.value(s);
+    if (std::isfinite(e.mean)) high = std::max(high, e.mean + (std::isfinite(e.half_95) ? e.half_95 : 0.0));
+    const auto p = published(s.design);
+    if (p && bar.printed != nullptr) high = std::max(high, bar.printed(*p));
+  }
+  const Panel panel{left, top, 190.0, 230.0, 0.0, 1.12 * high, false};
+  panel.draw(svg, bar.title);
+  const double place = panel.width / static_cast<double>(summaries.size());
+  for (std::size_t i = 0; i < summaries.size(); ++i) {
+    const Estimate e = bar.value(summaries[i]);
+    const double x = panel.left + place * (static_cast<double>(i) + 0.5);
+    const double half = 0.32 * place;
+    if (std::isfinite(e.mean)) {
+      svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="{}"/>)", x - half,
+              panel.y(e.mean), 2.0 * half, panel.y(0.0) - panel.y(e.mean), colour_of(i));
+      panel.whisker(svg, x, e);
+    }
+    svg.text(x, panel.top + panel.height + 17.0, three_digits(e.mean), "middle", 12, kInk, "bold");
+    const auto p = published(summaries[i].design);
+    if (!p || bar.printed == nullptr) continue;
+    const double y = panel.y(bar.printed(*p));
+    svg.add(
+        R"(<line x1="{:.1f}" x2="{:.1f}" y1="{:.1f}" y2="{:.1f}" stroke="{}" stroke-width="2.5" stroke-dasharray="5 3"/>)",
+        x - 0.45 * place, x + 0.45 * place, y, y, kInk);
+    svg.text(x, panel.top + panel.height + 32.0, fmt::format("[{:g}]", bar.printed(*p)), "middle", 11, kSoft);
+  }
+}
+
+struct Knob {
+  const char* name;
+  double (*value)(const SweepRow&);
+  double (*printed_ratio)(const Published&);
+};
+
+struct Metric {
+  const char* name;
+  double (*value)(const MissionResult&);
+  bool printed;
+};
+
+/// The points of one design: knob, and what was measured at it.
+std::vector<std::pair<double, Estimate>> curve(const std::vector<SweepRow>& rows, const std::string& profile,
+                                               const std::string& design, const Knob& knob,
+                                               const Metric& metric) {
+  std::set<double> values;
+  for (const SweepRow& row : rows) values.insert(knob.value(row));
+  std::vector<std::pair<double, Estimate>> points;
+  for (const double value : values) {
+    std::vector<const SweepRow*> mine;
+    for (const SweepRow& row : rows) {
+      if (row.result.profile == profile && row.result.design == design && !(knob.value(row) < value) &&
+          !(knob.value(row) > value))
+        mine.push_back(&row);
+    }
+    const Estimate e = estimate(mine, metric.value);
+    if (std::isfinite(e.mean)) points.emplace_back(value, e);
+  }
+  return points;
+}
+
+std::vector<std::string> designs_of(const std::vector<SweepRow>& rows, const std::string& profile) {
+  std::vector<std::string> designs;
+  for (const DesignSummary& s : summarise(rows)) {
+    if (s.profile == profile) designs.push_back(s.design);
+  }
+  return designs;
+}
+
+void draw_sensitivity(Svg& svg, const std::vector<SweepRow>& rows, const std::string& profile,
+                      const Knob& knob, const Metric& metric, double left, double top) {
+  const std::vector<std::string> designs = designs_of(rows, profile);
+  double low = 1e300;
+  double high = 0.0;
+  std::set<double> knobs;
+  for (const std::string& design : designs) {
+    for (const auto& [value, e] : curve(rows, profile, design, knob, metric)) {
+      knobs.insert(value);
+      low = std::min(low, e.mean);
+      high = std::max(high, e.mean);
+    }
+  }
+  if (!(high > 0.0 && low > 0.0)) low = high = 1.0;
+  const Panel panel{left, top, 270.0, 180.0, low / 1.6, high * 1.6, true};
+  panel.draw(svg, fmt::format("{} over {}", metric.name, knob.name));
+  const double first = knobs.empty() ? 0.0 : *knobs.begin();
+  const double span = knobs.empty() ? 1.0 : std::max(*knobs.rbegin() - first, 1e-9);
+  const auto x = [&](double value) {
+    return panel.left + panel.width * (0.1 + 0.8 * (knobs.size() > 1 ? (value - first) / span : 0.5));
+  };
+  for (const double value : knobs)
+    svg.text(x(value), panel.top + panel.height + 16.0, fmt::format("{:g}", value), "middle", 11, kSoft);
+  for (std::size_t i = 0; i < designs.size(); ++i) {
+    const auto points = curve(rows, profile, designs[i], knob, metric);
+    std::string line;
+    for (const auto& [value, e] : points) line += fmt::format("{:.1f},{:.1f} ", x(value), panel.y(e.mean));
+    svg.add(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="2"/>)", line, colour_of(i));
+    for (const auto& [value, e] : points) {
+      panel.whisker(svg, x(value), e);
+      svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="3.5" fill="{}"/>)", x(value), panel.y(e.mean),
+              colour_of(i));
+    }
+    if (points.size() < 2) continue;
+    std::string ratio = fmt::format("{:.2f}x", points.back().second.mean / points.front().second.mean);
+    const auto p = published(designs[i]);
+    if (p && metric.printed) ratio += fmt::format(" [{:g}x]", knob.printed_ratio(*p));
+    svg.text(panel.left + 4.0 + 90.0 * static_cast<double>(i), panel.top + panel.height + 33.0, ratio,
+             "start", 12, colour_of(i), "bold");
+  }
+}
+
+void draw_key(Svg& svg, const std::vector<std::string>& names, double left, double y) {
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="12" height="12" rx="2" fill="{}"/>)", left, y - 11.0,
+            colour_of(i));
+    svg.text(left + 18.0, y, names[i], "start", 13);
+    left += 40.0 + 8.0 * static_cast<double>(names[i].size());
+  }
+}
+
+/// Time axis of one flight.
+struct TimeAxis {
+  double left, width, last_s;
+  [[nodiscard]] double x(double s) const { return left + width * std::clamp(s / last_s, 0.0, 1.0); }
+};
+
+void draw_line(Svg& svg, const MissionReport& flight, const TimeAxis& axis, const Panel& panel,
+               double (*value)(const DecisionRecord&), const char* colour) {
+  std::string points;
+  double y_before = panel.y(panel.low);
+  for (const DecisionRecord& d : flight.decisions) {
+    // As steps: a value holds until the next decision.
+    points += fmt::format("{0:.1f},{1:.1f} {0:.1f},{2:.1f} ", axis.x(d.time_s), y_before, panel.y(value(d)));
+    y_before = panel.y(value(d));
+  }
+  svg.add(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="1.3"/>)", points, colour);
+}
+
+void draw_stages(Svg& svg, const MissionReport& flight, const TimeAxis& axis, const Panel& panel) {
+  // One path a stage: the tops of its part of each decision and back along the bottoms.
+  const std::size_t count = flight.decisions.size();
+  std::vector<double> bottom_s(count, 0.0);
+  for (std::size_t stage = 0; stage < core::kStageCount; ++stage) {
+    std::string area;
+    for (std::size_t i = 0; i < count; ++i) {
+      const DecisionRecord& d = flight.decisions[i];
+      const double x0 = axis.x(d.time_s);
+      const double x1 = axis.x(i + 1 < count ? flight.decisions[i + 1].time_s : d.time_s + d.deadline_s);
+      const double top_s = bottom_s[i] + d.stage_s[stage];
+      area += fmt::format("M{0:.1f} {2:.1f}V{3:.1f}H{1:.1f}V{2:.1f}z", x0, x1, panel.y(bottom_s[i]),
+                          panel.y(top_s));
+      bottom_s[i] = top_s;
+    }
+    svg.add(R"(<path d="{}" fill="{}"/>)", area, kStageColour[stage]);
+  }
+}
+
+std::size_t zone_of(const DecisionRecord& d, const std::vector<double>& borders_m) {
+  return static_cast<std::size_t>(std::count_if(borders_m.begin(), borders_m.end(),
+                                                [&d](double border_m) { return d.p_WB.x() >= border_m; }));
+}
+
+void draw_zones(Svg& svg, const MissionReport& flight, const std::vector<double>& borders_m, double left,
+                double top) {
+  const std::size_t zones = borders_m.size() + 1;
+  std::vector<std::array<double, core::kStageCount>> mean_s(zones);
+  std::vector<double> whole_s(zones, 0.0);
+  for (std::size_t zone = 0; zone < zones; ++zone) {
+    const auto inside = [&](const DecisionRecord& d) { return zone_of(d, borders_m) == zone; };
+    const auto count = std::count_if(flight.decisions.begin(), flight.decisions.end(), inside);
+    for (const DecisionRecord& d : flight.decisions) {
+      for (std::size_t i = 0; inside(d) && i < core::kStageCount; ++i) {
+        mean_s[zone][i] += d.stage_s[i] / static_cast<double>(count);
+        whole_s[zone] += d.stage_s[i] / static_cast<double>(count);
+      }
+    }
+  }
+  const double high_s = std::max(0.1, 1.1 * *std::max_element(whole_s.begin(), whole_s.end()));
+  const Panel panel{left, top, 240.0, 358.0, 0.0, high_s, false};
+  panel.draw(svg, "mean latency by zone, s");
+  const double place = panel.width / static_cast<double>(zones);
+  for (std::size_t zone = 0; zone < zones; ++zone) {
+    const double x = panel.left + place * (static_cast<double>(zone) + 0.2);
+    double bottom_s = 0.0;
+    for (std::size_t i = 0; i < core::kStageCount; ++i) {
+      const double top_s = bottom_s + mean_s[zone][i];
+      svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="{}"/>)", x, panel.y(top_s),
+              0.6 * place, panel.y(bottom_s) - panel.y(top_s), kStageColour[i]);
+      bottom_s = top_s;
+    }
+    const std::string name = zones == 1 ? std::string("all") : std::string(1, static_cast<char>('A' + zone));
+    svg.text(x + 0.3 * place, panel.top + panel.height + 16.0, fmt::format("{}: {:.2f}", name, whole_s[zone]),
+             "middle", 12);
+  }
+}
+
+}  // namespace
+
+std::string overall_svg(const std::vector<SweepRow>& rows) {
+  const std::vector<DesignSummary> summaries = summarise(rows);
+  const std::array<Bar, 5> bars{
+      {{"mean velocity, m/s", [](const DesignSummary& s) { return s.velocity_mps; },
+        [](const Published& p) { return p.velocity_mps; }},
+       {"mission time, s", [](const DesignSummary& s) { return s.mission_time_s; },
+        [](const Published& p) { return p.mission_time_s; }},
+       {"energy, kJ", [](const DesignSummary& s) { return s.energy_kJ; },
+        [](const Published& p) { return p.energy_kJ; }},
+       {"median latency, s", [](const DesignSummary& s) { return s.latency_s; }, nullptr},
+       {"CPU time a decision, s", [](const DesignSummary& s) { return s.cpu_s_per_decision; }, nullptr}}};
+  Svg svg;
+  std::vector<std::string> names;
+  names.reserve(summaries.size());
+  for (const DesignSummary& s : summaries)
+    names.push_back(fmt::format("{}, {}: {} of {} reached, {} collided", s.design, s.profile, s.reached,
+                                s.missions, s.collided));
+  draw_key(svg, names, 30.0, 28.0);
+  for (std::size_t i = 0; i < bars.size() && !summaries.empty(); ++i)
+    draw_bars(svg, summaries, bars[i], 60.0 + 260.0 * static_cast<double>(i), 70.0);
+  svg.text(
+      30.0, 364.0,
+      "bars: means over the missions that reached the goal; whiskers: 95 % interval over seeds; dashes and "
+      "[ ]: published",
+      "start", 12, kSoft);
+  return svg.finish(std::max(1330.0, 60.0 + 430.0 * static_cast<double>(names.size())), 380.0);
+}
+
+std::string sensitivity_svg(const std::vector<SweepRow>& rows, const std::string& profile) {
+  constexpr std::array<Knob, 3> kKnobs{{{"density", [](const SweepRow& r) { return r.density_ratio; },
+                                         [](const Published& p) { return p.time_ratio_density; }},
+                                        {"spread, m", [](const SweepRow& r) { return r.spread_m; },
+                                         [](const Published& p) { return p.time_ratio_spread; }},
+                                        {"goal distance, m", [](const SweepRow& r) { return r.distance_m; },
+                                         [](const Published& p) { return p.time_ratio_distance; }}}};
+  constexpr std::array<Metric, 3> kMetrics{{{"mission time, s,", mission_time, true},
+                                            {"velocity, m/s,", velocity, false},
+                                            {"energy, kJ,", energy, false}}};
+  Svg svg;
+  draw_key(svg, designs_of(rows, profile), 60.0, 28.0);
+  for (std::size_t m = 0; m < kMetrics.size(); ++m) {
+    for (std::size_t k = 0; k < kKnobs.size(); ++k)
+      draw_sensitivity(svg, rows, profile, kKnobs[k], kMetrics[m], 60.0 + 350.0 * static_cast<double>(k),
+                       70.0 + 260.0 * static_cast<double>(m));
+  }
+  svg.text(
+      60.0, 850.0,
+      "below each chart: highest knob against lowest, [ ]: published; whiskers: 95 % interval over seeds",
+      "start", 12, kSoft);
+  return svg.finish(1100.0, 866.0);
+}
+
+std::string breakdown_svg(std::span<const MissionReport> flights, const std::vector<double>& zone_borders_m) {
+  constexpr double kWidth = 1400.0;
+  constexpr double kLeft = 60.0;
+  constexpr double kChart = 980.0;
+  Svg svg;
+  double key_x = kLeft;
+  for (std::size_t i = 0; i < core::kStageCount; ++i) {
+    svg.add(R"(<rect x="{:.1f}" y="17" width="12" height="12" rx="2" fill="{}"/>)", key_x, kStageColour[i]);
+    svg.text(key_x + 18.0, 28.0, core::to_string(static_cast<core::StageId>(i)));
+    key_x += 120.0;
+  }
+  svg.text(key_x, 28.0, "line: deadline; dashed: borders of the zones");
+  double y = 100.0;
+  for (const MissionReport& flight : flights) {
+    double last_s = 1.0;
+    double longest_s = 0.1;
+    double fastest_mps = 1.0;
+    for (const DecisionRecord& d : flight.decisions) {
+      last_s = std::max(last_s, d.time_s + d.deadline_s);
+      longest_s = std::max(longest_s, d.latency_s);
+      fastest_mps = std::max(fastest_mps, d.speed_mps);
+    }
+    const TimeAxis axis{kLeft, kChart, last_s};
+    svg.text(kLeft, y - 28.0, flight.result.design, "start", 16, kInk, "bold");
+    const Panel speed{kLeft, y, kChart, 70.0, 0.0, std::ceil(fastest_mps), false};
+    const Panel precision{kLeft, y + 104.0, kChart, 70.0, 0.25, 10.0, true};
+    const Panel latency{kLeft, y + 208.0, kChart, 150.0, 0.0, 1.1 * longest_s, false};
+    speed.draw(svg, "velocity, m/s");
+    precision.draw(svg, "precision p0, m");
+    latency.draw(svg, "latency by stage, s");
+    draw_line(
+        svg, flight, axis, speed, [](const DecisionRecord& d) { return d.speed_mps; }, kInk);
+    draw_line(
+        svg, flight, axis, precision, [](const DecisionRecord& d) { return d.p0_m; }, kInk);
+    draw_stages(svg, flight, axis, latency);
+    draw_line(
+        svg, flight, axis, latency, [](const DecisionRecord& d) { return d.deadline_s; }, kInk);
+    for (std::size_t i = 1; i < flight.decisions.size(); ++i) {
+      const DecisionRecord& d = flight.decisions[i];
+      if (zone_of(d, zone_borders_m) == zone_of(flight.decisions[i - 1], zone_borders_m)) continue;
+      svg.add(
+          R"(<line x1="{0:.1f}" x2="{0:.1f}" y1="{1:.1f}" y2="{2:.1f}" stroke="{3}" stroke-dasharray="6 5"/>)",
+          axis.x(d.time_s), speed.top, latency.top + latency.height, kSoft);
+    }
+    const double step_s = nice_step(last_s, 8.0);
+    for (int i = 0; i * step_s <= last_s; ++i)
+      svg.text(axis.x(i * step_s), latency.top + latency.height + 16.0, fmt::format("{:g} s", i * step_s),
+               "middle", 11, kSoft);
+    draw_zones(svg, flight, zone_borders_m, kLeft + kChart + 70.0, y);
+    y += 452.0;
+  }
+  return svg.finish(kWidth, y - 50.0);
+}
+
+}  // namespace roborun::report

@@ -1,0 +1,27 @@
+/// The figures of the paper's evaluation, from a sweep. Each function gives a complete SVG file without
+/// external resources; the same rows give the same bytes.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "platform/report/mission_result.hpp"
+#include "platform/report/sweep_summary.hpp"
+
+namespace roborun::report {
+
+/// Velocity, mission time, energy, latency and CPU time a decision: a bar a design and profile, whiskers: 95
+/// % interval over seeds, dashes: what RoboRun printed.
+[[nodiscard]] std::string overall_svg(const std::vector<SweepRow>& rows);
+
+/// Mission time, velocity and energy over density, spread and distance, logarithmic: a line a design of
+/// `profile`, whiskers as above, and the ratio of the highest knob to the lowest beside the published one.
+[[nodiscard]] std::string sensitivity_svg(const std::vector<SweepRow>& rows, const std::string& profile);
+
+/// One flight a design: velocity, precision and the latency of each stage over time, with the deadline, and
+/// the mean latency by stage in zones A, B and C (the borders are x in metres; empty: one zone).
+[[nodiscard]] std::string breakdown_svg(std::span<const MissionReport> flights,
+                                        const std::vector<double>& zone_borders_m);
+
+}  // namespace roborun::report

@@ -1,0 +1,226 @@
+#include "platform/report/sweep_summary.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+
+namespace roborun::report {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// Two-sided 95 % quantile of Student's t.
+double student_t(std::size_t degrees) {
+  constexpr std::array<double, 10> kSmall{12.706, 4.303, 3.182, 2.776, 2.571,
+                                          2.447,  2.365, 2.306, 2.262, 2.228};
+  if (degrees <= kSmall.size()) return kSmall[degrees - 1];
+  // Cornish-Fisher expansion around the normal quantile: within 0.001 from 11 degrees on.
+  const auto n = static_cast<double>(degrees);
+  constexpr double z = 1.959964;
+  return z + (z * z * z + z) / (4.0 * n) +
+         (5.0 * std::pow(z, 5) + 16.0 * z * z * z + 3.0 * z) / (96.0 * n * n);
+}
+
+bool counts(const MissionResult& r) { return r.reached_goal && !r.collided; }
+
+double velocity(const MissionResult& r) { return r.mean_velocity_mps; }
+double mission_time(const MissionResult& r) { return r.mission_time_s; }
+double energy(const MissionResult& r) { return r.energy_kJ; }
+double latency(const MissionResult& r) { return r.latency_s.median; }
+double cpu_per_decision(const MissionResult& r) {
+  return r.decisions > 0 ? r.cpu_s / static_cast<double>(r.decisions) : kNaN;
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return kNaN;
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
+std::string shown(double value, int digits) {
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value, digits) : std::string("-");
+}
+
+std::string shown(const Estimate& e, int digits) {
+  return std::isfinite(e.half_95) ? fmt::format("{} +-{}", shown(e.mean, digits), shown(e.half_95, digits))
+                                  : shown(e.mean, digits);
+}
+
+}  // namespace
+
+std::optional<Published> published(const std::string& design) {
+  if (design == "static") return Published{0.4, 2093.0, 1000.0, 1.1, 1.1, 2.0};
+  if (design == "aware") return Published{2.5, 465.0, 257.0, 1.5, 1.4, 1.3};
+  return std::nullopt;
+}
+
+Estimate estimate(const std::vector<const SweepRow*>& rows, double (*value)(const MissionResult&)) {
+  struct Sum {
+    double sum{};
+    int count{};
+  };
+  std::map<std::uint64_t, Sum> of_seed;
+  Sum all;
+  for (const SweepRow* row : rows) {
+    const double x = value(row->result);
+    if (!counts(row->result) || !std::isfinite(x)) continue;
+    Sum& s = of_seed[row->result.seed];
+    s.sum += x;
+    ++s.count;
+    all.sum += x;
+    ++all.count;
+  }
+  Estimate e;
+  if (all.count == 0) return e;
+  e.mean = all.sum / all.count;
+  const std::size_t n = of_seed.size();
+  if (n < 2) return e;
+  double mean = 0.0;
+  for (const auto& [seed, s] : of_seed) mean += s.sum / s.count / static_cast<double>(n);
+  double square = 0.0;
+  for (const auto& [seed, s] : of_seed) square += (s.sum / s.count - mean) * (s.sum / s.count - mean);
+  e.half_95 = student_t(n - 1) * std::sqrt(square / static_cast<double>(n - 1) / static_cast<double>(n));
+  return e;
+}
+
+std::vector<DesignSummary> summarise(const std::vector<SweepRow>& rows) {
+  std::vector<DesignSummary> summaries;
+  for (const SweepRow& row : rows) {
+    const bool known = std::any_of(summaries.begin(), summaries.end(), [&row](const DesignSummary& s) {
+      return s.design == row.result.design && s.profile == row.result.profile;
+    });
+    if (known) continue;
+    DesignSummary s;
+    s.design = row.result.design;
+    s.profile = row.result.profile;
+    std::vector<const SweepRow*> mine;
+    std::vector<double> latencies_s;
+    for (const SweepRow& other : rows) {
+      const MissionResult& r = other.result;
+      if (r.design != s.design || r.profile != s.profile) continue;
+      mine.push_back(&other);
+      ++s.missions;
+      s.reached += counts(r) ? 1 : 0;
+      s.collided += r.collided ? 1 : 0;
+      s.decisions += r.decisions;
+      s.deadline_misses += r.deadline_misses;
+      if (counts(r)) latencies_s.push_back(r.latency_s.median);
+    }
+    s.velocity_mps = estimate(mine, velocity);
+    s.mission_time_s = estimate(mine, mission_time);
+    s.energy_kJ = estimate(mine, energy);
+    s.latency_s = estimate(mine, latency);
+    s.latency_s.mean = median(latencies_s);
+    s.cpu_s_per_decision = estimate(mine, cpu_per_decision);
+    summaries.push_back(std::move(s));
+  }
+  return summaries;
+}
+
+Gain gain(const std::vector<SweepRow>& rows, const std::string& profile, const std::string& design,
+          const std::string& baseline) {
+  std::map<std::pair<std::string, std::uint64_t>, const MissionResult*> base;
+  for (const SweepRow& row : rows) {
+    const MissionResult& r = row.result;
+    if (r.profile == profile && r.design == baseline && counts(r)) base[{r.env, r.seed}] = &r;
+  }
+  Gain g;
+  std::array<double, 4> mine{};
+  std::array<double, 4> theirs{};
+  std::vector<double> my_latency_s;
+  std::vector<double> their_latency_s;
+  for (const SweepRow& row : rows) {
+    const MissionResult& r = row.result;
+    const auto found = base.find({r.env, r.seed});
+    if (r.profile != profile || r.design != design || !counts(r) || found == base.end()) continue;
+    ++g.pairs;
+    const MissionResult& b = *found->second;
+    constexpr std::array<double (*)(const MissionResult&), 4> kValue{velocity, mission_time, energy,
+                                                                     cpu_per_decision};
+    for (std::size_t i = 0; i < kValue.size(); ++i) {
+      mine[i] += kValue[i](r);
+      theirs[i] += kValue[i](b);
+    }
+    my_latency_s.push_back(latency(r));
+    their_latency_s.push_back(latency(b));
+  }
+  g.velocity = mine[0] / theirs[0];
+  g.mission_time = mine[1] / theirs[1];
+  g.energy = mine[2] / theirs[2];
+  g.cpu_s_per_decision = mine[3] / theirs[3];
+  g.latency = median(my_latency_s) / median(their_latency_s);
+  return g;
+}
+
+std::string sweep_table(const std::vector<SweepRow>& rows) {
+  const std::vector<DesignSummary> summaries = summarise(rows);
+  std::string text =
+      fmt::format("{:<12} {:<8} {:>8} {:>7} {:>8} {:>13} {:>15} {:>13} {:>9} {:>9}\n", "design", "profile",
+                  "missions", "reached", "collided", "mean m/s", "time s", "kJ", "latency s", "CPU s per");
+  text += fmt::format("{:<12} {:<8} {:>8} {:>7} {:>8} {:>13} {:>15} {:>13} {:>9} {:>9}\n", "", "", "", "", "",
+                      "", "", "", "median", "decision");
+  for (const DesignSummary& s : summaries) {
+    text +=
+        fmt::format("{:<12} {:<8} {:>8} {:>7} {:>8} {:>13} {:>15} {:>13} {:>9} {:>9}\n", s.design, s.profile,
+                    s.missions, s.reached, s.collided, shown(s.velocity_mps, 2), shown(s.mission_time_s, 0),
+                    shown(s.energy_kJ, 0), shown(s.latency_s.mean, 2), shown(s.cpu_s_per_decision, 2));
+    if (const auto p = published(s.design)) {
+      text += fmt::format("{:<12} {:<8} {:>8} {:>7} {:>8} {:>13} {:>15} {:>13}\n", "  published", "", 27, "",
+                          "", shown(p->velocity_mps, 1), shown(p->mission_time_s, 0), shown(p->energy_kJ, 0));
+    }
+  }
+  text +=
+      "means over the missions that reached the goal; +-: 95 % interval over seeds (none with one seed)\n";
+  for (const DesignSummary& s : summaries) {
+    for (const char* baseline : {"static", "static-fair"}) {
+      if (s.design != "aware") continue;
+      const Gain g = gain(rows, s.profile, s.design, baseline);
+      if (g.pairs == 0) continue;
+      text += fmt::format(
+          "{}, {} against {} ({} pairs): {:.2f}x velocity, {:.2f}x shorter, {:.2f}x less energy, {:.1f}x "
+          "lower "
+          "latency, {:.0f} % less CPU\n",
+          s.profile, s.design, baseline, g.pairs, g.velocity, 1.0 / g.mission_time, 1.0 / g.energy,
+          1.0 / g.latency, 100.0 * (1.0 - g.cpu_s_per_decision));
+    }
+  }
+  for (const SweepRow& row : rows) {
+    const MissionResult& r = row.result;
+    if (counts(r)) continue;
+    text += fmt::format("not reached: environment {}, {}, {}, seed {}: {} after {:.0f} s\n", r.env, r.profile,
+                        r.design, r.seed, r.reason, r.mission_time_s);
+  }
+  return text;
+}
+
+std::string sweep_json(const std::string& suite, const std::vector<SweepRow>& rows, bool complete) {
+  using Json = nlohmann::ordered_json;
+  const auto number = [](double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); };
+  Json profiles = Json::object();
+  for (const DesignSummary& s : summarise(rows)) {
+    Json json{{"missions", s.missions}, {"reached", s.reached}, {"collided", s.collided}};
+    json["mean_velocity_mps"] = number(s.velocity_mps.mean);
+    json["mean_mission_time_s"] = number(s.mission_time_s.mean);
+    json["mean_energy_kJ"] = number(s.energy_kJ.mean);
+    json["median_latency_s"] = number(s.latency_s.mean);
+    json["cpu_s_per_decision"] = number(s.cpu_s_per_decision.mean);
+    json["half_95"] = {{"mean_velocity_mps", number(s.velocity_mps.half_95)},
+                       {"mean_mission_time_s", number(s.mission_time_s.half_95)},
+                       {"mean_energy_kJ", number(s.energy_kJ.half_95)},
+                       {"cpu_s_per_decision", number(s.cpu_s_per_decision.half_95)}};
+    json["decisions"] = s.decisions;
+    json["deadline_misses"] = s.deadline_misses;
+    profiles[s.profile][s.design] = std::move(json);
+  }
+  Json json{{"suite", suite}, {"complete", complete}};
+  json["designs"] = profiles.empty() ? Json::object() : profiles.front();
+  json["profiles"] = profiles;
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace roborun::report

@@ -1,0 +1,92 @@
+#!/usr/bin/env bash
+# roborun sweep: bad input gets one line and exit code 2 and leaves no folder; after Ctrl-C and after kill -9 the same
+# command goes on, and ends with the bytes of a run that was never stopped; --json ends with one JSON object.
+set -u
+roborun=$1
+folder=$(mktemp -d "${TMPDIR:-/tmp}/roborun_sweep_cli.XXXXXX")
+trap 'rm -rf "$folder"' EXIT
+failed=0
+passed=0
+check() {
+  local name=$1
+  shift
+  if "$@"; then passed=$((passed + 1)); else echo "FAILED $name"; failed=$((failed + 1)); fi
+}
+refuses() {
+  local wanted=$1 out err code
+  shift
+  out=$("$roborun" sweep "$@" --out "$folder/no" </dev/null 2>"$folder/err")
+  code=$?
+  err=$(cat "$folder/err")
+  if [[ $code -ne 2 || -n "$out" || $(wc -l <<<"$err") -ne 1 || "$err" != *"$wanted"* || -e "$folder/no" ]]; then
+    echo "FAILED [$code] roborun sweep $*: '$err' does not say '$wanted' in one line with exit code 2, or made a folder"
+    failed=$((failed + 1))
+  else
+    passed=$((passed + 1))
+  fi
+}
+refuses "must be paper27" --suite x
+refuses "1 .. 27" --environments 28
+refuses "1 .. 27" --environments 1,,2
+refuses "given twice" --environments 1,1
+refuses "aware, static, static-fair" --designs foo
+refuses "given twice" --designs aware,aware
+refuses "paper, host, or a file" --profile nope
+refuses "given twice" --profile paper,paper
+refuses "whole number" --seeds 1,-2
+refuses "whole number" --seeds ""
+refuses "given twice" --seeds 3,3
+refuses "own or octomap" --map foo
+refuses "ompl:RRTstar" --planner foo
+refuses "package_delivery or search_and_rescue" --mission x
+refuses "cannot be opened" --settings nope.toml
+refuses "1 to 1024" --jobs 0
+refuses "1 to 1024" --jobs 1.5
+refuses "1 <= I <= N" --shard 0/4
+refuses "1 <= I <= N" --shard 5/4
+refuses "1 <= I <= N" --shard 2
+refuses "--nope" --nope
+refuses "required" merge
+refuses "cannot be opened" merge /nonexistent
+
+printf '[flight]\ntime_limit_s = 15\n' >"$folder/short.toml"
+sweep() { "$roborun" sweep --environments 1,14 --designs aware,static --settings "$folder/short.toml" --jobs 2 "$@" 2>/dev/null; }
+sweep --out "$folder/whole" >"$folder/table"
+check "the table" grep -q "^aware  *paper" "$folder/table"
+other=$("$roborun" sweep --out "$folder/whole" 2>&1)
+check "another request in the same folder is refused" test $? -eq 2 -a "${other/other environments/}" != "$other"
+made=$("$roborun" sweep --out /proc/nope 2>&1)
+check "a folder that cannot be made is refused" test $? -eq 2 -a "${made/cannot be made/}" != "$made"
+for signal in INT KILL; do
+  # A job of its own, so that the shell does not make it ignore SIGINT.
+  set -m
+  sweep --out "$folder/$signal" >/dev/null &
+  set +m
+  for _ in $(seq 1000); do [[ -s "$folder/$signal/results.jsonl" ]] && break; sleep 0.02; done
+  kill -$signal -- -$! 2>/dev/null
+  wait $! 2>/dev/null
+  sweep --out "$folder/$signal" >/dev/null
+  check "goes on after $signal" diff -r "$folder/whole" "$folder/$signal"
+done
+check "one JSON object" test "$(sweep --out "$folder/whole" --json | tee "$folder/json" | wc -l)" -eq 1
+check "its designs" grep -q '"designs":{"aware":{"missions":2,' "$folder/json"
+cat >"$folder/board.toml" <<'BOARD'
+[board]
+machine = "a board"
+per_unit_s = [1e-7, 0, 1e-7, 1e-7, 1e-7, 1e-7]
+[map]
+mean = [0, 0, 1e-6, 1, 1e-6, 0.01]
+p99 = [0, 0, 1e-6, 1, 2e-6, 0.02]
+[export]
+mean = [0, 0, 0, 1, 1e-7, 0.001]
+p99 = [0, 0, 0, 1, 2e-7, 0.002]
+[planner]
+mean = [0, 0, 0, 1, 1e-6, 0.01]
+p99 = [0, 0, 0, 1, 2e-6, 0.02]
+BOARD
+"$roborun" sweep --environments 1 --designs aware --settings "$folder/short.toml" --profile "paper,$folder/board.toml" \
+  --out "$folder/boards" --json >"$folder/json" 2>/dev/null
+check "a board file is a profile" grep -q '"profiles":{"paper":{"aware":.*},"board":{"aware":{"missions":1,' "$folder/json"
+check "each profile has its picture" test -s "$folder/boards/sensitivity_board.svg"
+echo "$passed passed, $failed failed"
+[[ $failed -eq 0 && $passed -ge 32 ]]
