@@ -4,8 +4,6 @@
 #include <unistd.h>
 
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -16,6 +14,7 @@
 #include "platform/report/trace_csv.hpp"
 #include "platform/sitl/world/generator.hpp"
 #include "platform/sitl/world/input_error.hpp"
+#include "platform/sitl/world/text_file.hpp"
 
 namespace roborun::app {
 namespace {
@@ -36,17 +35,13 @@ struct Options {
   std::string spin;
 };
 
-std::string read_all(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(fmt::format("{}: cannot be opened", path));
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 int compare(const Options& options) {
   if (!(options.tolerance_ratio >= 1.0 && options.tolerance_ratio <= 100.0))
     throw InputError(
         fmt::format("--tolerance: {} is out of range: must be from 1 to 100", options.tolerance_ratio));
-  const std::string before = read_all(options.compare[0]), after = read_all(options.compare[1]);
+  constexpr std::string_view kWanted = "a file that roborun audit --json printed";
+  const std::string before = sitl::read_text(options.compare[0], kWanted);
+  const std::string after = sitl::read_text(options.compare[1], kWanted);
   report::Comparison result;
   try {
     result = report::compare_audits(before, after, options.tolerance_ratio);

@@ -8,12 +8,13 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 
+#include "core/geometry/camera_pose.hpp"
 #include "platform/app/backends.hpp"
 #include "platform/report/trace_csv.hpp"
+#include "platform/rt/host_identity.hpp"
 #include "platform/sitl/world/generator.hpp"
+#include "platform/sitl/world/text_file.hpp"
 #include "platform/sitl/world/toml_reader.hpp"
 #include "stages/perception/point_cloud.hpp"
 #include "stages/planning/smoother.hpp"
@@ -56,8 +57,7 @@ class Scan {
       cameras_[i].expose(MonotonicTime{}, X_WB);
       stages::PosedDepthFrame posed;
       if (cameras_[i].read(posed.frame) != Status::kOk) continue;
-      for (int k = 0; k < 9; ++k) posed.X_WC.R_RT(k / 3, k % 3) = mounts[i].R_BC[static_cast<std::size_t>(k)];
-      posed.X_WC.p_RT = X_WB.p_RT;
+      posed.X_WC = core::camera_pose(X_WB, mounts[i]);
       frames_.push_back(posed);
     }
   }
@@ -192,15 +192,6 @@ class Sweeper {
   std::array<double, core::kStageCount> units_{};
 };
 
-std::string machine_name() {
-  std::ifstream file("/proc/cpuinfo");
-  for (std::string line; std::getline(file, line);) {
-    const auto colon = line.find(": ");
-    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return "unknown";
-}
-
 std::array<double, 6> numbers_of(const governor::Eq4& e) {
   return {e.q[0], e.q[1], e.q[2], e.q[3], e.per_m3_s, e.constant_s};
 }
@@ -221,7 +212,7 @@ BoardProfile measure_board(int repeats, const std::function<void(double)>& progr
   }
   sweep = {};
   BoardProfile board = sweeper.result(sweep);
-  board.machine = machine_name();
+  board.machine = rt::identify_host().cpu;
   return board;
 }
 
@@ -313,9 +304,8 @@ std::string default_host_path() {
 }
 
 Profile host(const std::string& path, double factor, std::string& note) {
-  std::ifstream file(path, std::ios::binary);
-  if (file)
-    return to_profile(board_from_toml(path, std::string(std::istreambuf_iterator<char>(file), {})), factor);
+  if (std::filesystem::exists(path))
+    return to_profile(board_from_toml(path, sitl::read_text(path, "a readable file")), factor);
   // Read back from its own text, so that the first run uses the same digits as all later ones.
   BoardSweep sweep;
   const std::string text = to_toml(measure_board(2, {}, sweep));
@@ -332,11 +322,9 @@ Profile load_profile(const std::string& name) {
   if (name == "paper") return paper();
   std::string note;
   if (name == "host") return host(default_host_path(), 1.0, note);
-  std::ifstream file(name, std::ios::binary);
-  if (!file)
-    throw sitl::InputError(
-        fmt::format("profile '{}': must be paper, host, or a file that roborun calibrate wrote", name));
-  return to_profile(board_from_toml(name, std::string(std::istreambuf_iterator<char>(file), {})), 1.0);
+  const std::string text =
+      sitl::read_text(name, "the profile paper or host, or a file that roborun calibrate wrote");
+  return to_profile(board_from_toml(name, text), 1.0);
 }
 
 }  // namespace roborun::app

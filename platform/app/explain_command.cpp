@@ -4,8 +4,6 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <sstream>
@@ -13,6 +11,7 @@
 
 #include "core/executive/stage_budget.hpp"
 #include "platform/sitl/world/input_error.hpp"
+#include "platform/sitl/world/text_file.hpp"
 
 namespace roborun::app {
 namespace {
@@ -178,11 +177,7 @@ void add_explain_command(CLI::App& app, std::function<int()>& run) {
   command->add_option("--design", options->design, "If the trace holds several [the first]");
   command->callback([options, &run] {
     run = [options] {
-      std::ifstream file(options->file, std::ios::binary);
-      if (!file)
-        throw InputError(fmt::format("{}: cannot be opened: must be a file that roborun fly --trace wrote",
-                                     options->file));
-      const std::string csv(std::istreambuf_iterator<char>(file), {});
+      const std::string csv = sitl::read_text(options->file, "a file that roborun fly --trace wrote");
       fmt::print("{}", explain_decision(options->file, csv, options->at_s, options->design));
       return 0;
     };

@@ -1,5 +1,6 @@
 #include "platform/app/flight_programs.hpp"
 
+#include "core/geometry/camera_pose.hpp"
 #include "core/random/counter_rng.hpp"
 
 namespace roborun::app {
@@ -58,12 +59,7 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
     if (camera->read(posed.frame) != Status::kOk ||
         report.estimator.pose_at(posed.frame.stamp, X_WB) != Status::kOk)
       continue;
-    const firmware_if::CameraMount& mount = camera->mount();
-    Matrix3 R_BC;
-    Vector3 p_BC;
-    for (int i = 0; i < 9; ++i) R_BC(i / 3, i % 3) = mount.R_BC[static_cast<std::size_t>(i)];
-    for (int i = 0; i < 3; ++i) p_BC[i] = mount.p_BC_m[static_cast<std::size_t>(i)];
-    posed.X_WC = {X_WB.R_RT * R_BC, X_WB * p_BC};
+    posed.X_WC = core::camera_pose(X_WB, camera->mount());
     (void)frames_.push_back(posed);
   }
   if (frames_.empty()) {

@@ -1,8 +1,6 @@
 #include "platform/app/settings_file.hpp"
 
-#include <fstream>
-#include <iterator>
-
+#include "platform/sitl/world/text_file.hpp"
 #include "platform/sitl/world/toml_reader.hpp"
 
 namespace roborun::app {
@@ -36,9 +34,7 @@ const toml::table* section(const sitl::TomlReader& reader, const toml::table& ro
 }  // namespace
 
 void load_settings(const std::string& path, MissionConfig& config) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw sitl::InputError(fmt::format("{}: cannot be opened: must be a readable TOML file", path));
-  const toml::table root = sitl::parse_toml(path, std::string(std::istreambuf_iterator<char>(file), {}));
+  const toml::table root = sitl::parse_toml(path, sitl::read_text(path, "a readable TOML file"));
   const sitl::TomlReader reader(path);
   reader.allow_keys(root, "the file", {"camera", "wind", "battery", "flight", "cpu"});
 

@@ -6,8 +6,6 @@
 #include <charconv>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <set>
 #include <thread>
@@ -18,6 +16,7 @@
 #include "platform/app/sweep_run.hpp"
 #include "platform/sitl/world/generator.hpp"
 #include "platform/sitl/world/input_error.hpp"
+#include "platform/sitl/world/text_file.hpp"
 
 namespace roborun::app {
 namespace {
@@ -40,11 +39,6 @@ struct Options {
   bool json{false};
   std::vector<std::string> merged;
 };
-
-std::string read_file(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 std::optional<int> whole_number(const std::string& text, int low, int high) {
   int value = 0;
@@ -113,7 +107,7 @@ SweepPlan plan_of(const Options& options, SweepInputs& inputs) {
   plan.planner = options.planner;
   if (!options.settings.empty()) {
     load_settings(options.settings, inputs.base);
-    plan.settings = digest_of(read_file(options.settings));
+    plan.settings = digest_of(sitl::read_text(options.settings, "a readable TOML file"));
   }
   std::vector<std::string> names;
   for (const std::string& text : split(options.profiles)) {
@@ -126,7 +120,7 @@ SweepPlan plan_of(const Options& options, SweepInputs& inputs) {
     inputs.profile[name] = profile;
   }
   refuse_twice("--profile", names);
-  plan.build = digest_of(read_file("/proc/self/exe"));
+  plan.build = digest_of(sitl::read_text("/proc/self/exe", "this program"));
   return plan;
 }
 

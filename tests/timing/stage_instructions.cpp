@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/geometry/camera_pose.hpp"
 #include "platform/sitl/sensors/depth_camera.hpp"
 #include "platform/sitl/sensors/navigation_sensors.hpp"
 #include "platform/sitl/world/generator.hpp"
@@ -47,8 +48,7 @@ int main() {
       cameras[i].expose(MonotonicTime{Nanos{1'000'000'000LL * (pose + 1)}}, X_WB);
       stages::PosedDepthFrame posed;
       if (cameras[i].read(posed.frame) != Status::kOk) return 1;
-      for (int k = 0; k < 9; ++k) posed.X_WC.R_RT(k / 3, k % 3) = mounts[i].R_BC[static_cast<std::size_t>(k)];
-      posed.X_WC.p_RT = X_WB.p_RT;
+      posed.X_WC = core::camera_pose(X_WB, mounts[i]);
       frames.push_back(posed);
     }
     (void)cloud.step(frames, 0, unlimited, work);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/geometry/camera_pose.hpp"
 #include "core/random/counter_rng.hpp"
 
 namespace roborun::sitl {
@@ -32,11 +33,7 @@ void SimulatedDepthCamera::expose(MonotonicTime now, const Pose& X_WB) noexcept 
   Exposure& e = ring_[taken_ % ring_.size()];
   e.stamp = now;
   e.sequence = taken_;
-  Matrix3 R_BC;
-  Vector3 p_BC;
-  for (int i = 0; i < 9; ++i) R_BC(i / 3, i % 3) = mount_.R_BC[static_cast<std::size_t>(i)];
-  for (int i = 0; i < 3; ++i) p_BC[i] = mount_.p_BC_m[static_cast<std::size_t>(i)];
-  e.X_WC = {X_WB.R_RT * R_BC, X_WB * p_BC};
+  e.X_WC = core::camera_pose(X_WB, mount_);
   core::CounterRng rng(seed_, 0x1000U + camera_);
   rng.seek(std::uint64_t{taken_});
   e.lost = rng.uniform() < config_.frame_dropout_ratio;

@@ -34,7 +34,7 @@ refuses "cannot be written" calibrate --repeats 1 --out /nonexistent/x.toml
 refuses "whole number" fly --seed -1
 refuses "whole number" fly --seed 1x
 refuses "own or octomap" fly --map foo
-refuses "ompl:RRTstar" fly --planner ompl:Foo
+refuses "must be own or ompl:NAME" fly --planner ompl:Foo
 refuses "speed or precision" fly --color red
 refuses "package_delivery or search_and_rescue" fly --mission x
 refuses "cannot be opened" fly --world nope.toml

@@ -59,10 +59,11 @@ TEST_F(RealTimeRun, AStageThatSpinsInTheDecisionLaneTakesNoFrameFromTheFlightLan
   const report::AuditLane& decision = lane(r, core::LaneId::kDecision);
   ASSERT_GE(decision.response.max_us, 2e6) << "the fault was not there";
   EXPECT_GE(decision.slips, 700U);
-  EXPECT_EQ(slot(r, core::SlotId::kGather).overruns, 1U) << "blamed";
+  EXPECT_GE(slot(r, core::SlotId::kGather).overruns, 1U) << "blamed";
   for (const report::AuditSlot& s : r.slots) {
-    if (s.lane != "decision") continue;
-    EXPECT_EQ(s.overruns, s.name == "gather" ? 1U : 0U) << s.name;
+    if (s.lane == "decision" && s.name != "gather") {
+      EXPECT_LT(s.time.max_us, 2e6) << s.name << " is blamed for the fault of gather";
+    }
   }
   const report::AuditLane& flight = lane(r, core::LaneId::kFlight);
   EXPECT_GT(flight.frames, 1000U) << "of 1,600; 800 fell into the fault";

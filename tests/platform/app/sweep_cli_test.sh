@@ -37,7 +37,7 @@ refuses "whole number" --seeds 1,-2
 refuses "whole number" --seeds ""
 refuses "given twice" --seeds 3,3
 refuses "own or octomap" --map foo
-refuses "ompl:RRTstar" --planner foo
+refuses "must be own or ompl:NAME" --planner foo
 refuses "package_delivery or search_and_rescue" --mission x
 refuses "cannot be opened" --settings nope.toml
 refuses "1 to 1024" --jobs 0
