@@ -322,8 +322,7 @@ Profile load_profile(const std::string& name) {
   if (name == "paper") return paper();
   std::string note;
   if (name == "host") return host(default_host_path(), 1.0, note);
-  const std::string text =
-      sitl::read_text(name, "the profile paper or host, or a file that roborun calibrate wrote");
+  const std::string text = sitl::read_text(name, "paper, host, or a file that roborun calibrate wrote");
   return to_profile(board_from_toml(name, text), 1.0);
 }
 

@@ -49,7 +49,8 @@ class NodeGrid {
 
   [[nodiscard]] Cell cell_of(const Vector3& p_W) const noexcept;
   [[nodiscard]] std::int32_t& head(std::int32_t x, std::int32_t y, std::int32_t z) const noexcept {
-    return head_[static_cast<std::size_t>((z * size_[1] + y) * size_[0] + x)];
+    const std::int64_t at = (std::int64_t{z} * size_[1] + y) * size_[0] + x;
+    return head_[static_cast<std::size_t>(at)];
   }
 
   std::span<Point> point_;
