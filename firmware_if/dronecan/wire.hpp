@@ -107,7 +107,7 @@ struct Int {
   static constexpr std::int64_t kMost = (std::int64_t{1} << (kBits - 1)) - 1;
 
   static constexpr void write(BitWriter& out, Value value, bool /*tail*/) noexcept {
-    std::int64_t wide = value;
+    std::int64_t wide = value;  // NOLINT(bugprone-signed-char-misuse): a number
     wide = wide > kMost ? kMost : (wide < -kMost - 1 ? -kMost - 1 : wide);
     out.put<kBits>(static_cast<std::uint64_t>(wide));
   }
