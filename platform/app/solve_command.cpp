@@ -121,7 +121,6 @@ Json answer(const Json& json, std::size_t number) {
   const governor::SolverProblem p = Problem(json, number).read(finite_model);
   const governor::SolverSolution s = finite_model ? governor::solve(p) : governor::SolverSolution{};
   const auto cell_m = [&p](int level) { return p.p_min_m * static_cast<double>(1 << level); };
-  const auto finite = [](double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); };
   Json out;
   if (s.status == Status::kInvalidArgument) {
     out["status"] = "invalid";
@@ -135,8 +134,8 @@ Json answer(const Json& json, std::size_t number) {
   out["status"] = s.status == Status::kOk ? "ok" : "infeasible";
   out["p_m"] = {cell_m(s.p0_level), cell_m(s.p1_level), cell_m(s.p1_level)};
   out["v_m3"] = {s.v0_m3, s.v1_m3, s.v2_m3};
-  out["latency_s"] = finite(s.latency_s);
-  out["objective"] = finite(s.objective_s2);
+  out["latency_s"] = s.latency_s;
+  out["objective"] = s.objective_s2;
   out["active"] = Json::array();
   out["multipliers"] = Json::object();
   for (std::size_t i = 0; i < governor::kConstraintCount; ++i) {

@@ -4,26 +4,10 @@
 #include <cmath>
 
 #include "platform/report/audit_report.hpp"
+#include "platform/report/svg.hpp"
 
 namespace roborun::report {
 namespace {
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '<')
-      out += "&lt;";
-    else if (c == '>')
-      out += "&gt;";
-    else if (c == '&')
-      out += "&amp;";
-    else if (c == '"')
-      out += "&quot;";
-    else
-      out += c;
-  }
-  return out;
-}
 
 /// Share of frames that took longer, over duration, both logarithmic.
 std::string plot(const std::string& title, const TimingSummary& t, double budget_us) {
@@ -41,7 +25,7 @@ std::string plot(const std::string& title, const TimingSummary& t, double budget
   std::string svg = fmt::format(
       "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\"><text x=\"{2}\" y=\"14\" "
       "class=\"t\">{3}</text>",
-      kWidth, kHeight, kLeft, escaped(title));
+      kWidth, kHeight, kLeft, xml_escape(title));
   for (double d = low; d <= high; ++d)
     svg += fmt::format(
         "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\" class=\"g\"/><text x=\"{0:.1f}\" "
@@ -65,7 +49,7 @@ std::string plot(const std::string& title, const TimingSummary& t, double budget
 
 std::string row(const std::vector<std::string>& cells, const char* tag = "td") {
   std::string out = "<tr>";
-  for (const std::string& cell : cells) out += fmt::format("<{0}>{1}</{0}>", tag, escaped(cell));
+  for (const std::string& cell : cells) out += fmt::format("<{0}>{1}</{0}>", tag, xml_escape(cell));
   return out + "</tr>\n";
 }
 
@@ -89,9 +73,9 @@ std::string audit_html(const AuditReport& r) {
   h += fmt::format("<p>{:.0f} s{}, {} decisions ({} too late), {:.0f} m flown.</p>", r.seconds,
                    r.load ? " under load" : "", r.decisions, r.decisions_too_late, r.flown_m);
   for (const std::string& why : r.missing)
-    h += fmt::format("<p class=\"bad\">Not real time (best effort): {}</p>", escaped(why));
+    h += fmt::format("<p class=\"bad\">Not real time (best effort): {}</p>", xml_escape(why));
   if (!r.stopped_by.empty())
-    h += fmt::format("<p class=\"bad\">Stopped by the overruns of {}</p>", escaped(r.stopped_by));
+    h += fmt::format("<p class=\"bad\">Stopped by the overruns of {}</p>", xml_escape(r.stopped_by));
   h += "<table>" + row({"memory", ""}, "th");
   h += row({"heap calls after start",
             r.heap_sealed ? fmt::format("{}", r.heap_calls_after_start) : "not counted"});

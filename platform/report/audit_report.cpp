@@ -12,12 +12,10 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 double us(Nanos duration) { return 1e-3 * static_cast<double>(duration.count()); }
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json timing(const TimingSummary& t) {
-  return {{"count", t.count},        {"min", number(t.min_us)},   {"median", number(t.median_us)},
-          {"p99", number(t.p99_us)}, {"p999", number(t.p999_us)}, {"p9999", number(t.p9999_us)},
-          {"max", number(t.max_us)}};
+  return {{"count", t.count},  {"min", t.min_us},     {"median", t.median_us}, {"p99", t.p99_us},
+          {"p999", t.p999_us}, {"p9999", t.p9999_us}, {"max", t.max_us}};
 }
 
 Json lane_json(const AuditLane& l) {
@@ -44,14 +42,14 @@ Json slot_json(const AuditSlot& s) {
   j["name"] = s.name;
   j["lane"] = s.lane;
   j["count"] = s.time.count;
-  j["min_us"] = number(s.time.min_us);
-  j["median_us"] = number(s.time.median_us);
-  j["p99_us"] = number(s.time.p99_us);
-  j["p999_us"] = number(s.time.p999_us);
-  j["p9999_us"] = number(s.time.p9999_us);
-  j["max_us"] = number(s.time.max_us);
-  j["budget_us"] = number(s.budget_us);
-  j["margin_ratio"] = number(s.margin_ratio);
+  j["min_us"] = s.time.min_us;
+  j["median_us"] = s.time.median_us;
+  j["p99_us"] = s.time.p99_us;
+  j["p999_us"] = s.time.p999_us;
+  j["p9999_us"] = s.time.p9999_us;
+  j["max_us"] = s.time.max_us;
+  j["budget_us"] = s.budget_us;
+  j["margin_ratio"] = s.margin_ratio;
   j["on_overrun"] = s.policy;
   j["overruns"] = s.overruns;
   j["reactions"] = s.reactions;
@@ -59,10 +57,10 @@ Json slot_json(const AuditSlot& s) {
   j["longest"] = {{"frame", s.longest.frame},
                   {"time_s", seconds(s.longest.at.time_since_epoch())},
                   {"work_units", s.longest.work.units},
-                  {"volume_m3", number(s.longest.work.volume_m3)},
+                  {"volume_m3", s.longest.work.volume_m3},
                   {"level", s.longest.work.level}};
   Json p = {{"fitted", s.pwcet.fitted}, {"verdict", s.pwcet.verdict}, {"block_frames", s.block_frames}};
-  if (s.pwcet.fitted) p["exceeded_by_one_block_in_1e9_us"] = number(s.pwcet.exceeded_1e9_us);
+  if (s.pwcet.fitted) p["exceeded_by_one_block_in_1e9_us"] = s.pwcet.exceeded_1e9_us;
   j["pwcet"] = p;
   return j;
 }
@@ -100,7 +98,7 @@ std::uint64_t major_faults(const AuditReport& r) {
 
 std::string to_json(const AuditReport& r) {
   Json j;
-  j["seconds"] = number(r.seconds);
+  j["seconds"] = r.seconds;
   j["best_effort"] = r.best_effort;
   j["missing"] = r.missing;
   j["load"] = r.load;
@@ -114,8 +112,8 @@ std::string to_json(const AuditReport& r) {
   j["decisions_too_late"] = r.decisions_too_late;
   j["exposures_dropped"] = r.exposures_dropped;
   j["offers_refused"] = r.offers_refused;
-  j["flown_m"] = number(r.flown_m);
-  j["least_clearance_m"] = number(r.least_clearance_m);
+  j["flown_m"] = r.flown_m;
+  j["least_clearance_m"] = r.least_clearance_m;
   j["stopped_by"] = r.stopped_by;
   j["lanes"] = Json::array();
   for (const AuditLane& l : r.lanes) j["lanes"].push_back(lane_json(l));

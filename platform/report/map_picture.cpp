@@ -5,27 +5,14 @@
 #include <algorithm>
 #include <iterator>
 
+#include "platform/report/svg.hpp"
+
 namespace roborun::report {
 namespace {
 
 constexpr double kWidth_px = 900.0;
 constexpr double kMargin_px = 50.0;
 constexpr double kTallest_px = 700.0;
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '<')
-      out += "&lt;";
-    else if (c == '>')
-      out += "&gt;";
-    else if (c == '&')
-      out += "&amp;";
-    else
-      out += c;
-  }
-  return out;
-}
 
 double scale_px(const MapPanel& panel) {
   return std::min((kWidth_px - 2.0 * kMargin_px) / panel.columns, kTallest_px / panel.rows);
@@ -35,7 +22,8 @@ double scale_px(const MapPanel& panel) {
 void draw(const MapPanel& panel, double top_px, std::string& out) {
   const double px = scale_px(panel);
   const auto to = std::back_inserter(out);
-  fmt::format_to(to, "<text x='{}' y='{:.1f}'>{}</text>\n", kMargin_px, top_px - 8.0, escaped(panel.title));
+  fmt::format_to(to, "<text x='{}' y='{:.1f}'>{}</text>\n", kMargin_px, top_px - 8.0,
+                 xml_escape(panel.title));
   fmt::format_to(to, "<rect x='{}' y='{:.1f}' width='{:.2f}' height='{:.2f}' fill='#d9d9d9'/>\n", kMargin_px,
                  top_px, px * panel.columns, px * panel.rows);
   for (int row = 0; row < panel.rows; ++row) {
@@ -50,10 +38,10 @@ void draw(const MapPanel& panel, double top_px, std::string& out) {
   }
   fmt::format_to(to, "<text x='{}' y='{:.1f}'>{:.1f} .. {:.1f} {}</text>\n", kMargin_px,
                  top_px + px * panel.rows + 16.0, panel.right_m, panel.right_m + panel.cell_m * panel.columns,
-                 escaped(panel.right_axis));
+                 xml_escape(panel.right_axis));
   fmt::format_to(to, "<text transform='translate({},{:.1f}) rotate(-90)'>{:.1f} .. {:.1f} {}</text>\n",
                  kMargin_px - 8.0, top_px + px * panel.rows, panel.up_m,
-                 panel.up_m + panel.cell_m * panel.rows, escaped(panel.up_axis));
+                 panel.up_m + panel.cell_m * panel.rows, xml_escape(panel.up_axis));
 }
 
 }  // namespace
@@ -76,7 +64,7 @@ std::string map_svg(const std::string& title, std::span<const MapPanel> panels) 
              "<rect x='150' y='40' width='12' height='12' class='f'/><text x='168' y='51'>free</text>\n"
              "<rect x='220' y='40' width='12' height='12' fill='#d9d9d9'/><text x='238' "
              "y='51'>unknown</text>\n",
-             kWidth_px, top_px, kMargin_px, escaped(title)) +
+             kWidth_px, top_px, kMargin_px, xml_escape(title)) +
          body + "</svg>\n";
 }
 

@@ -7,7 +7,6 @@ namespace roborun::report {
 
 std::string to_json(const MissionResult& r) {
   using Json = nlohmann::ordered_json;
-  const auto number = [](double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); };
   Json json;
   json["design"] = r.design;
   json["profile"] = r.profile;
@@ -15,29 +14,26 @@ std::string to_json(const MissionResult& r) {
   json["seed"] = r.seed;
   json["reached_goal"] = r.reached_goal;
   json["collided"] = r.collided;
-  json["mission_time_s"] = number(r.mission_time_s);
-  json["distance_m"] = number(r.distance_m);
-  json["mean_velocity_mps"] = number(r.mean_velocity_mps);
-  json["max_velocity_mps"] = number(r.max_velocity_mps);
-  json["energy_kJ"] = number(r.energy_kJ);
+  json["mission_time_s"] = r.mission_time_s;
+  json["distance_m"] = r.distance_m;
+  json["mean_velocity_mps"] = r.mean_velocity_mps;
+  json["max_velocity_mps"] = r.max_velocity_mps;
+  json["energy_kJ"] = r.energy_kJ;
   json["decisions"] = r.decisions;
   json["deadline_misses"] = r.deadline_misses;
-  json["latency_s"] = {{"median", number(r.latency_s.median)},
-                       {"p99", number(r.latency_s.p99)},
-                       {"max", number(r.latency_s.max)}};
-  json["cpu_s"] = number(r.cpu_s);
-  json["cpu_utilization_ratio"] = number(r.cpu_utilization_ratio);
-  json["precision_m"] = {{"min", number(r.precision_m.min)},
-                         {"median", number(r.precision_m.median)},
-                         {"max", number(r.precision_m.max)}};
-  json["real_time_factor"] = number(r.real_time_factor);
+  json["latency_s"] = {{"median", r.latency_s.median}, {"p99", r.latency_s.p99}, {"max", r.latency_s.max}};
+  json["cpu_s"] = r.cpu_s;
+  json["cpu_utilization_ratio"] = r.cpu_utilization_ratio;
+  json["precision_m"] = {
+      {"min", r.precision_m.min}, {"median", r.precision_m.median}, {"max", r.precision_m.max}};
+  json["real_time_factor"] = r.real_time_factor;
   json["map_bytes"] = r.map_bytes;
   json["state_hash"] = r.state_hash;
   json["map"] = r.map;
   json["planner"] = r.planner;
   json["mission"] = r.mission;
   json["reason"] = r.reason;
-  json["speed_limit_mps"] = number(r.speed_limit_mps);
+  json["speed_limit_mps"] = r.speed_limit_mps;
   // Text from file names may be anything: invalid UTF-8 is replaced, never thrown over.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -200,19 +200,18 @@ std::string sweep_table(const std::vector<SweepRow>& rows) {
 
 std::string sweep_json(const std::string& suite, const std::vector<SweepRow>& rows, bool complete) {
   using Json = nlohmann::ordered_json;
-  const auto number = [](double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); };
   Json profiles = Json::object();
   for (const DesignSummary& s : summarise(rows)) {
     Json json{{"missions", s.missions}, {"reached", s.reached}, {"collided", s.collided}};
-    json["mean_velocity_mps"] = number(s.velocity_mps.mean);
-    json["mean_mission_time_s"] = number(s.mission_time_s.mean);
-    json["mean_energy_kJ"] = number(s.energy_kJ.mean);
-    json["median_latency_s"] = number(s.latency_s.mean);
-    json["cpu_s_per_decision"] = number(s.cpu_s_per_decision.mean);
-    json["half_95"] = {{"mean_velocity_mps", number(s.velocity_mps.half_95)},
-                       {"mean_mission_time_s", number(s.mission_time_s.half_95)},
-                       {"mean_energy_kJ", number(s.energy_kJ.half_95)},
-                       {"cpu_s_per_decision", number(s.cpu_s_per_decision.half_95)}};
+    json["mean_velocity_mps"] = s.velocity_mps.mean;
+    json["mean_mission_time_s"] = s.mission_time_s.mean;
+    json["mean_energy_kJ"] = s.energy_kJ.mean;
+    json["median_latency_s"] = s.latency_s.mean;
+    json["cpu_s_per_decision"] = s.cpu_s_per_decision.mean;
+    json["half_95"] = {{"mean_velocity_mps", s.velocity_mps.half_95},
+                       {"mean_mission_time_s", s.mission_time_s.half_95},
+                       {"mean_energy_kJ", s.energy_kJ.half_95},
+                       {"cpu_s_per_decision", s.cpu_s_per_decision.half_95}};
     json["decisions"] = s.decisions;
     json["deadline_misses"] = s.deadline_misses;
     profiles[s.profile][s.design] = std::move(json);

@@ -165,18 +165,23 @@ TEST(OmplPlanner, MeasuresOursBesideItsOwn) {
   }
 }
 
-TEST(RrtStar, RepeatsForTheSameSeed) {
-  std::vector<std::byte> block(4U << 20U);
-  core::Arena arena(block);
-  RrtStar sut({}, arena);
+class RrtStarTest : public ::testing::Test {
+ protected:
+  std::vector<std::byte> block_ = std::vector<std::byte>(4U << 20U);
+  core::Arena arena_{block_};
+  RrtStar sut_{{}, arena_};
+  core::UnlimitedBudget unlimited_;
+  PlanResult result_;
+};
+
+TEST_F(RrtStarTest, RepeatsForTheSameSeed) {
   const test::BoxView view = pillar_world();
-  core::UnlimitedBudget unlimited;
   PlanResult a, b;
-  (void)sut.plan(request_to(Vector3(150, 0, 5)), view, unlimited, a);
+  (void)sut_.plan(request_to(Vector3(150, 0, 5)), view, unlimited_, a);
   PlanRequest other = request_to(Vector3(150, 3, 5));
   other.seed = 9;
-  (void)sut.plan(other, view, unlimited, b);
-  (void)sut.plan(request_to(Vector3(150, 0, 5)), view, unlimited, b);
+  (void)sut_.plan(other, view, unlimited_, b);
+  (void)sut_.plan(request_to(Vector3(150, 0, 5)), view, unlimited_, b);
   ASSERT_EQ(a.path_W.size(), b.path_W.size());
   for (std::size_t i = 0; i < a.path_W.size(); ++i) EXPECT_EQ(a.path_W[i], b.path_W[i]);
 }
@@ -195,88 +200,64 @@ PlanRequest through_the_aisle() {
   return r;
 }
 
-TEST(RrtStar, PullsAPathToAKnownGoalTight) {
-  std::vector<std::byte> block(4U << 20U);
-  core::Arena arena(block);
-  RrtStar sut({}, arena);
+TEST_F(RrtStarTest, PullsAPathToAKnownGoalTight) {
   const test::BoxView view = aisle();
-  core::UnlimitedBudget unlimited;
-  PlanResult result;
   // Around the corners of the first pillar, (11.1, 3.9), and of the last, (45.9, 3.9): 61.0 m; the boxes of a
   // check reach a little farther than the vehicle.
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     PlanRequest r = through_the_aisle();
     r.seed = seed;
-    ASSERT_EQ(sut.plan(r, view, unlimited, result), Status::kOk);
-    EXPECT_TRUE(result.reaches_goal);
-    EXPECT_GT(result.cost_m, 60.9);
-    EXPECT_LT(result.cost_m, 62.2) << "seed " << seed;
+    ASSERT_EQ(sut_.plan(r, view, unlimited_, result_), Status::kOk);
+    EXPECT_TRUE(result_.reaches_goal);
+    EXPECT_GT(result_.cost_m, 60.9);
+    EXPECT_LT(result_.cost_m, 62.2) << "seed " << seed;
     std::uint64_t lookups = 0;
-    for (std::size_t i = 0; i + 1 < result.path_W.size(); ++i)
-      ASSERT_TRUE(is_segment_free(view, result.path_W[i], result.path_W[i + 1], r.radius_m, lookups));
+    for (std::size_t i = 0; i + 1 < result_.path_W.size(); ++i)
+      ASSERT_TRUE(is_segment_free(view, result_.path_W[i], result_.path_W[i + 1], r.radius_m, lookups));
   }
 }
 
-TEST(RrtStar, EndsWithTheFirstPathThatSatisfies) {
-  std::vector<std::byte> block(4U << 20U);
-  core::Arena arena(block);
-  RrtStar sut({}, arena);
+TEST_F(RrtStarTest, EndsWithTheFirstPathThatSatisfies) {
   const test::BoxView view = aisle();
-  core::UnlimitedBudget unlimited;
   PlanResult first, best;
   PlanRequest r = through_the_aisle();
-  ASSERT_EQ(sut.plan(r, view, unlimited, best), Status::kOk);
+  ASSERT_EQ(sut_.plan(r, view, unlimited_, best), Status::kOk);
   r.satisfied_m = 1e300;
-  ASSERT_EQ(sut.plan(r, view, unlimited, first), Status::kOk);
+  ASSERT_EQ(sut_.plan(r, view, unlimited_, first), Status::kOk);
   EXPECT_TRUE(first.reaches_goal);
   EXPECT_LT(first.work.units, best.work.units / 10);
   EXPECT_GE(first.cost_m, best.cost_m);
 }
 
-TEST(RrtStar, GoesAsNearAsItCanToAGoalThatIsWalledIn) {
-  std::vector<std::byte> block(4U << 20U);
-  core::Arena arena(block);
-  RrtStar sut({}, arena);
+TEST_F(RrtStarTest, GoesAsNearAsItCanToAGoalThatIsWalledIn) {
   test::BoxView view = aisle();
   view.occupied.push_back({Vector3(50, -24, 0), Vector3(51, 24, 20)});
-  core::UnlimitedBudget unlimited;
-  PlanResult result;
-  ASSERT_EQ(sut.plan(through_the_aisle(), view, unlimited, result), Status::kOk);
-  EXPECT_FALSE(result.reaches_goal);
-  EXPECT_GT(result.path_W.back().x(), 30.0);
-  EXPECT_LT(result.path_W.back().x(), 50.0);
+  ASSERT_EQ(sut_.plan(through_the_aisle(), view, unlimited_, result_), Status::kOk);
+  EXPECT_FALSE(result_.reaches_goal);
+  EXPECT_GT(result_.path_W.back().x(), 30.0);
+  EXPECT_LT(result_.path_W.back().x(), 50.0);
 }
 
-TEST(RrtStar, StopsAtVolumeAndBudget) {
-  std::vector<std::byte> block(4U << 20U);
-  core::Arena arena(block);
-  RrtStar sut({}, arena);
+TEST_F(RrtStarTest, StopsAtVolumeAndBudget) {
   const test::BoxView view = pillar_world();
-  core::UnlimitedBudget unlimited;
-  PlanResult result;
   PlanRequest r = request_to(Vector3(150, 0, 5));
   r.volume_m3 = 600.0;
-  EXPECT_EQ(sut.plan(r, view, unlimited, result), Status::kBudgetSpent);
-  EXPECT_LT(result.work.volume_m3, 900.0);
+  EXPECT_EQ(sut_.plan(r, view, unlimited_, result_), Status::kBudgetSpent);
+  EXPECT_LT(result_.work.volume_m3, 900.0);
   class None final : public core::StageBudget {
    public:
     [[nodiscard]] bool spent(const core::Work&) noexcept override { return true; }
   } none;
   r.volume_m3 = 1e9;
-  const Status status = sut.plan(r, view, none, result);
+  const Status status = sut_.plan(r, view, none, result_);
   EXPECT_TRUE(status == Status::kBudgetSpent || status == Status::kNoPath);
 }
 
-TEST(RrtStar, PlanDoesNotAllocate) {
-  std::vector<std::byte> block(4U << 20U);
-  core::Arena arena(block);
-  RrtStar sut({}, arena);
+TEST_F(RrtStarTest, PlanDoesNotAllocate) {
   const test::BoxView view = pillar_world();
-  core::UnlimitedBudget unlimited;
-  PlanResult result;
   const test::NoAllocScope scope;
-  (void)sut.plan(request_to(Vector3(150, 0, 5)), view, unlimited, result);
-  (void)sut.plan(request_to(Vector3(18, 1, 5)), view, unlimited, result);
+  (void)sut_.plan(request_to(Vector3(150, 0, 5)), view, unlimited_, result_);
+  (void)sut_.plan(request_to(Vector3(18, 1, 5)), view, unlimited_, result_);
   EXPECT_EQ(scope.count(), 0U);
 }
 

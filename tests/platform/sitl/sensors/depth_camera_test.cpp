@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/geometry/camera_pose.hpp"
+
 namespace roborun::sitl {
 namespace {
 
@@ -131,8 +133,7 @@ TEST(DepthCamera, SixCamerasSeeTheWholeSphere) {
       const Vector3 way(std::cos(a) * std::cos(b), std::sin(a) * std::cos(b), std::sin(b));
       int seen = 0;
       for (const auto& mount : six_camera_mounts()) {
-        Matrix3 R_BC;
-        for (int i = 0; i < 9; ++i) R_BC(i / 3, i % 3) = mount.R_BC[static_cast<std::size_t>(i)];
+        const Matrix3 R_BC = core::camera_pose({}, mount).R_RT;
         EXPECT_NEAR(R_BC.determinant(), 1.0, 1e-12) << "a rotation";
         const Vector3 way_C = R_BC.transpose() * way;
         seen += way_C.x() > 0 && std::max(std::fabs(way_C.y()), std::fabs(way_C.z())) <= way_C.x() + 1e-12
