@@ -173,9 +173,9 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
     d.source = BudgetSource::kShortest;
   }
 
-  // Time wins over precision: the deadline belongs to physics. Coarser until enough of the space can be seen
-  // in time.
-  while (coarsest < config_.coarsest_level && needed_s(coarsest, policy.least_share) > deadline_s) ++coarsest;
+  // Time wins over precision: the deadline belongs to physics. Coarser until all that is in view can be
+  // processed in time.
+  while (coarsest < config_.coarsest_level && needed_s(coarsest, 1.0) > deadline_s) ++coarsest;
   // Finer than asked for only where perception leaves the planner its share; otherwise perception is cut to
   // it.
   int finest = 0;
@@ -207,7 +207,7 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
 
   // Infeasible: the quickest decision there is; until it is there the vehicle lives on its braking tail.
   if (d.solution.status != Status::kOk) {
-    d.solution.v0_m3 = policy.least_share * see_m3;
+    d.solution.v0_m3 = see_m3;
     d.solution.v1_m3 = d.solution.v0_m3;
     d.solution.v2_m3 = policy.planner_share * d.solution.v0_m3;
     fill_prediction(d);
@@ -216,10 +216,9 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
     deadline_s = std::max(deadline_s, total_s * (1.0 + policy.reserve_ratio) + seconds(config_.minor_frame));
   }
 
-  // 4. How fast may the next trajectory be?
-  double speed_mps = std::clamp(safe_speed_mps(profile.closest_unknown_m, needed_s(coarsest, 1.0)),
-                                policy.slowest_mps, v_max_mps_);
-  if (near_goal) speed_mps = std::min(speed_mps, policy.near_goal_speed_mps);
+  // 4. How fast may the next trajectory be? As fast as it can still stop inside known free space, which the
+  // smoother sees to.
+  const double speed_mps = near_goal ? std::min(policy.near_goal_speed_mps, v_max_mps_) : v_max_mps_;
 
   d.point = {d.solution.p0_level, d.solution.p1_level,      d.solution.v0_m3, d.solution.v1_m3,
              d.solution.v2_m3,    whole_frames(deadline_s), speed_mps};

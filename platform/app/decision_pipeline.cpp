@@ -13,6 +13,14 @@ constexpr std::size_t index(core::StageId id) noexcept { return static_cast<std:
 constexpr double kTrajectoryStep_s = 0.5;  // of the points that order the space by distance
 constexpr std::size_t kTrajectoryPoints = 32;
 constexpr double kCornerRoom_m = 0.25;
+/// What the way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
+constexpr double kBeyond_mps = 2.0;
+
+/// When the vehicle would be at the goal, counted from in.now.
+double arrival_s(const Trajectory& trajectory, const DecisionInput& in) noexcept {
+  return seconds(trajectory.start_time - in.now) + trajectory.duration_s() +
+         (in.goal_W - trajectory.end_W()).norm() / kBeyond_mps;
+}
 
 }  // namespace
 
@@ -148,7 +156,12 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   charge(core::StageId::kPlanner, planner_work, out);
   charge(core::StageId::kSmoother, smoother_work, out);
 
-  if (out.smoother_status == Status::kOk) {
+  // A new trajectory begins slowly and another one may be there next time: what is flown now is kept as long
+  // as it is free, has not begun to brake and arrives no later.
+  const MonotonicTime brakes = in.committed->start_time + from_seconds(in.committed->brake_begin_s);
+  const bool keeps = committed_until_s > 1e300 && takes_over < brakes &&
+                     arrival_s(*in.committed, in) <= arrival_s(smoothed.trajectory, in);
+  if (out.smoother_status == Status::kOk && !keeps) {
     out.kind = DecisionKind::kNew;
     out.trajectory = smoothed.trajectory;
   } else if (committed_until_s < 1e300) {
@@ -183,7 +196,7 @@ void DecisionPipeline::run(core::StageId id, const DecisionInput& in, DecisionOu
       plan(in, out);
       for (std::size_t i = 0; i < core::kStageCount; ++i)
         governor_.observe(static_cast<core::StageId>(i), out.decision.predicted_s[i], seconds(out.cost[i]));
-      failures_ = out.kind == DecisionKind::kNew ? 0 : failures_ + 1;
+      failures_ = out.smoother_status == Status::kOk ? 0 : failures_ + 1;
       return;
     case core::StageId::kSmoother:
       return;

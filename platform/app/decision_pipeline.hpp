@@ -92,7 +92,7 @@ class DecisionPipeline {
   stages::OccupancyMap& map_;
   stages::Planner& planner_;
   stages::Smoother& smoother_;
-  int failures_{0};  ///< Decisions in a row without a new trajectory.
+  int failures_{0};  ///< Decisions in a row without a trajectory.
 };
 
 }  // namespace roborun::app
