@@ -22,7 +22,10 @@
 namespace roborun::app {
 namespace {
 
-constexpr int kPoses = 4;
+constexpr int kScenes =
+    2;  // among obstacles at the start, and in the open half-way: coarse cells plan nothing at the start
+constexpr int kPosesAScene = 2;
+constexpr int kPoses = kScenes * kPosesAScene;
 constexpr int kVolumes = 8;
 constexpr double kPoseStep_m = 1.5;
 constexpr double kMapReach_m = 40.0;
@@ -76,24 +79,30 @@ struct Samples {
 class Sweeper {
  public:
   Sweeper() : world_(sitl::generate(sitl::environment("14").knobs, sitl::Mission::kPackageDelivery, 1)) {
-    const Vector3 reach(kMapReach_m, kMapReach_m, 0.0);
-    bounds_W_ = {world_.start_W() - reach, world_.start_W() + reach};
-    bounds_W_.min_W.z() = world_.bounds_W().min_W.z() - 3.0;
-    bounds_W_.max_W.z() = world_.bounds_W().max_W.z() + 3.0;
-    block_.resize(backend_bytes(bounds_W_, {}) + stages::PointCloud::arena_bytes({}) + 4096);
-    for (int pose = 0; pose <= kPoses; ++pose) {
-      const Pose X_WB{Matrix3::Identity(), world_.start_W() + Vector3(kPoseStep_m * pose, 0.0, 0.0)};
-      poses_W_.push_back(X_WB.p_RT);
-      scans_.emplace_back(world_, X_WB, static_cast<std::uint64_t>(pose));
+    const Vector3 way = world_.goal_W() - world_.start_W();
+    for (int scene = 0; scene < kScenes; ++scene) {
+      const Vector3 center_W = world_.start_W() + 0.5 * scene * way;
+      const Vector3 reach(kMapReach_m, kMapReach_m, 0.0);
+      Aabb bounds_W{center_W - reach, center_W + reach};
+      bounds_W.min_W.z() = world_.bounds_W().min_W.z() - 3.0;
+      bounds_W.max_W.z() = world_.bounds_W().max_W.z() + 3.0;
+      bounds_W_.push_back(bounds_W);
+      for (int pose = 0; pose <= kPosesAScene; ++pose) {
+        const Pose X_WB{Matrix3::Identity(), center_W + Vector3(kPoseStep_m * pose, 0.0, 0.0)};
+        poses_W_.push_back(X_WB.p_RT);
+        scans_.emplace_back(world_, X_WB, static_cast<std::uint64_t>(pose));
+      }
     }
+    block_.resize(backend_bytes(bounds_W_[0], {}) + stages::PointCloud::arena_bytes({}) + 4096);
   }
 
   /// One decision's stages at a level and a share of the volume in view, on a map that knows the pose before.
   void run(int pose, int level, int eighth, std::uint64_t seed) {
-    const auto at = static_cast<std::size_t>(pose);
+    const auto scene = static_cast<std::size_t>(pose / kPosesAScene);
+    const auto at = static_cast<std::size_t>(pose) + scene;  // a scene has a pose more than it has steps
     core::Arena arena(block_);
     stages::PointCloud cloud({}, arena);
-    const MapAndPlanner backends = make_backends("own", "own", bounds_W_, {}, arena);
+    const MapAndPlanner backends = make_backends("own", "own", bounds_W_[scene], {}, arena);
     core::UnlimitedBudget unlimited;
     core::Work work;
     const std::array<Vector3, 1> before{poses_W_[at]};
@@ -124,7 +133,8 @@ class Sweeper {
     stages::PlanResult planned;
     s = timed([&] { (void)backends.planner->plan(request, backends.map->view(), unlimited, planned); });
     planned.work.level = level;
-    add(2, level, eighth, s, planned.work);
+    // Blocked at its start: nothing was planned, nothing measured.
+    if (planned.work.volume_m3 > 0.0) add(2, level, eighth, s, planned.work);
     if (planned.path_W.size() < 2) return;
     stages::SmoothRequest smooth;
     smooth.path_W = {planned.path_W.begin(), planned.path_W.size()};
@@ -144,6 +154,7 @@ class Sweeper {
       for (int level = 0; level < kPrecisionLevels; ++level) {
         for (int eighth = 1; eighth <= kVolumes; ++eighth) {
           Samples& samples = at(m, level, eighth);
+          if (samples.time_s.empty()) continue;
           std::sort(samples.time_s.begin(), samples.time_s.end());
           const auto count = static_cast<double>(samples.time_s.size());
           double sum_s = 0.0;
@@ -182,7 +193,7 @@ class Sweeper {
   }
 
   sitl::World world_;
-  Aabb bounds_W_;
+  std::vector<Aabb> bounds_W_;  ///< Of the map, a scene.
   std::vector<std::byte> block_;
   std::vector<Vector3> poses_W_;
   std::vector<Scan> scans_;
