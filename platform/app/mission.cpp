@@ -222,6 +222,8 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
       progress({seconds(now_.time_since_epoch()),
                 std::clamp(1.0 - (world_.goal_W() - s.p_WB).norm() / whole_m, 0.0, 1.0), s.v_WB.norm()});
     }
+    if (config_.each_frame)
+      config_.each_frame({now_, s, system_.flight().committed(), system_.flight().airborne()});
     reason = end_reason();
   }
   report_.result.reason = reason;

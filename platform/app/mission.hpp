@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/executive/cost_profile.hpp"
+#include "core/trajectory.hpp"
 #include "governor/policy/governor.hpp"
 #include "platform/report/mission_result.hpp"
 #include "platform/sitl/sensors/depth_camera.hpp"
@@ -15,6 +16,14 @@
 #include "platform/sitl/world/world.hpp"
 
 namespace roborun::app {
+
+/// What there is to see after one minor frame.
+struct FrameRecord {
+  MonotonicTime now{};
+  const sitl::VehicleState& truth;
+  const Trajectory& committed;
+  bool airborne{};
+};
 
 struct MissionConfig {
   governor::Design design{governor::Design::kAware};
@@ -34,6 +43,8 @@ struct MissionConfig {
   double slow_down_factor{1.0};
   double time_limit_s{7200.0};
   double no_progress_s{120.0};  ///< Not nearer to the goal for so long: the mission is given up, hovering.
+  /// Called after every minor frame, may be empty: what a test measures.
+  std::function<void(const FrameRecord&)> each_frame{};
 };
 
 struct Progress {
