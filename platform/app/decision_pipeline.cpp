@@ -110,10 +110,11 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
 
   // Is what we fly still free? If not, a stop takes over as soon as it can, unless it would end the freedom
   // sooner: a straight stop out of a descent meets the ground.
+  const stages::FinestView known(view);
   std::uint64_t check_lookups = 0;
   const double from_s = seconds(in.now - in.committed->start_time);
   const double committed_until_s =
-      free_until_s(view, *in.committed, from_s, config_.vehicle_radius_m, check_lookups);
+      free_until_s(known, *in.committed, from_s, config_.vehicle_radius_m, check_lookups);
 
   // First with room for the smoother to cut corners, then as tight as the vehicle can fly.
   stages::SmoothResult smoothed;
@@ -172,7 +173,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
         smoother_.brake(then, soonest, {config_.acceleration_mps2, config_.acceleration_mps2}, stop) ==
             Status::kOk) {
       const double stop_until_s = seconds(soonest - in.committed->start_time) +
-                                  free_until_s(view, stop, 0.0, config_.vehicle_radius_m, check_lookups);
+                                  free_until_s(known, stop, 0.0, config_.vehicle_radius_m, check_lookups);
       if (stop_until_s >= committed_until_s) {
         out.kind = DecisionKind::kBrake;
         out.trajectory = stop;

@@ -74,7 +74,12 @@ class BrickMap final : public OccupancyMap, private MapView {
   };
 
   // MapView, in place.
-  [[nodiscard]] bool is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept override;
+  [[nodiscard]] bool is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
+    return box_free(box_W, view_level_, view_radius_m_, lookups);
+  }
+  [[nodiscard]] bool is_free_at_finest(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
+    return box_free(box_W, 0, 1e18, lookups);
+  }
   [[nodiscard]] CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept override;
   [[nodiscard]] double cell_m() const noexcept override { return cell_size_m(view_level_); }
 
@@ -99,10 +104,14 @@ class BrickMap final : public OccupancyMap, private MapView {
   void free_vehicle() noexcept;
   [[nodiscard]] bool cell_of(const Vector3& p_W, Cell& cell) const noexcept;
   [[nodiscard]] std::size_t slot_of(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
-  [[nodiscard]] const Brick* visible_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
+  /// No deeper than to cells of `level`; bricks farther than `radius_m` from view_center_W_ are unknown.
+  [[nodiscard]] bool box_free(const Aabb& box_W, int level, double radius_m,
+                              std::uint64_t& lookups) const noexcept;
+  [[nodiscard]] const Brick* brick_within(std::int32_t bx, std::int32_t by, std::int32_t bz,
+                                          double radius_m) const noexcept;
   [[nodiscard]] Brick* touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
   [[nodiscard]] bool give_up_farthest() noexcept;
-  [[nodiscard]] bool brick_range_free(const Brick& brick, const Cell& low, const Cell& high,
+  [[nodiscard]] bool brick_range_free(const Brick& brick, const Cell& low, const Cell& high, int finest,
                                       std::uint64_t& lookups) const noexcept;
   [[nodiscard]] Vector3 brick_center_W(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
   void refresh(Brick& brick) noexcept;

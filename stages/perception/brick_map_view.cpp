@@ -49,16 +49,17 @@ Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& bu
   return status;
 }
 
-const Brick* BrickMap::visible_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
+const Brick* BrickMap::brick_within(std::int32_t bx, std::int32_t by, std::int32_t bz,
+                                    double radius_m) const noexcept {
   if (bx < 0 || by < 0 || bz < 0 || bx >= nx_ || by >= ny_ || bz >= nz_) return nullptr;
   const std::int32_t slot = slot_[slot_of(bx, by, bz)];
   if (slot == kUnknownBrick) return nullptr;
   const double distance2 = (brick_center_W(bx, by, bz) - view_center_W_).squaredNorm();
-  if (distance2 >= view_radius_m_ * view_radius_m_) return nullptr;
+  if (distance2 >= radius_m * radius_m) return nullptr;
   return slot == kFreeBrick ? &free_brick_ : &brick_[static_cast<std::size_t>(slot)];
 }
 
-bool BrickMap::brick_range_free(const Brick& brick, const Cell& low, const Cell& high,
+bool BrickMap::brick_range_free(const Brick& brick, const Cell& low, const Cell& high, int finest,
                                 std::uint64_t& lookups) const noexcept {
   std::array<Node, 7 * kBrickLevel + 1> stack{};
   std::size_t depth = 0;
@@ -68,7 +69,7 @@ bool BrickMap::brick_range_free(const Brick& brick, const Cell& low, const Cell&
     ++lookups;
     const std::uint8_t flags = brick.flags(node.level, morton3(node.x, node.y, node.z));
     if (flags == content::kFree) continue;
-    if (node.level <= view_level_) return false;
+    if (node.level <= finest) return false;
     const auto level = static_cast<unsigned>(node.level - 1);
     for (std::uint32_t child = 0; child < 8; ++child) {
       const Node next{node.level - 1, 2 * node.x + (child & 1U), 2 * node.y + ((child >> 1U) & 1U),
@@ -85,25 +86,26 @@ bool BrickMap::brick_range_free(const Brick& brick, const Cell& low, const Cell&
   return true;
 }
 
-bool BrickMap::is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept {
+bool BrickMap::box_free(const Aabb& box_W, int level, double radius_m,
+                        std::uint64_t& lookups) const noexcept {
   Cell low{};
   Cell high{};
   const bool ordered = (box_W.min_W.array() <= box_W.max_W.array()).all();
   if (!ordered || !cell_of(box_W.min_W, low) || !cell_of(box_W.max_W, high)) return false;
-  // Widened to whole cells of p1.
-  const std::int32_t mask = (1 << view_level_) - 1;
+  // Widened to whole cells of the level.
+  const std::int32_t mask = (1 << level) - 1;
   low = {low.x & ~mask, low.y & ~mask, low.z & ~mask};
   high = {high.x | mask, high.y | mask, high.z | mask};
   for (std::int32_t bz = low.z >> kBrickLevel; bz <= high.z >> kBrickLevel; ++bz) {
     for (std::int32_t by = low.y >> kBrickLevel; by <= high.y >> kBrickLevel; ++by) {
       for (std::int32_t bx = low.x >> kBrickLevel; bx <= high.x >> kBrickLevel; ++bx) {
         ++lookups;
-        const Brick* brick = visible_brick(bx, by, bz);
+        const Brick* brick = brick_within(bx, by, bz, radius_m);
         if (brick == nullptr) return false;
         if (brick->flags(kBrickLevel, 0) == content::kFree) continue;
         const Cell from{low.x - bx * kBrickCells, low.y - by * kBrickCells, low.z - bz * kBrickCells};
         const Cell to{high.x - bx * kBrickCells, high.y - by * kBrickCells, high.z - bz * kBrickCells};
-        if (!brick_range_free(*brick, from, to, lookups)) return false;
+        if (!brick_range_free(*brick, from, to, level, lookups)) return false;
       }
     }
   }
@@ -117,7 +119,7 @@ CellState BrickMap::at(const Vector3& p_W, std::uint64_t& lookups) const noexcep
   std::uint8_t flags = 0;
   const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
   if (view_level_ <= kBrickLevel) {
-    const Brick* brick = visible_brick(bx, by, bz);
+    const Brick* brick = brick_within(bx, by, bz, view_radius_m_);
     if (brick == nullptr) return CellState::kUnknown;
     const auto inside = [this](std::int32_t c) {
       return static_cast<std::uint32_t>(c & (kBrickCells - 1)) >> static_cast<unsigned>(view_level_);
@@ -125,8 +127,8 @@ CellState BrickMap::at(const Vector3& p_W, std::uint64_t& lookups) const noexcep
     flags = brick->flags(view_level_, morton3(inside(cell.x), inside(cell.y), inside(cell.z)));
   } else {
     for (std::int32_t child = 0; child < 8; ++child) {
-      const Brick* brick =
-          visible_brick((bx & ~1) + (child & 1), (by & ~1) + ((child >> 1) & 1), (bz & ~1) + (child >> 2));
+      const Brick* brick = brick_within((bx & ~1) + (child & 1), (by & ~1) + ((child >> 1) & 1),
+                                        (bz & ~1) + (child >> 2), view_radius_m_);
       flags = static_cast<std::uint8_t>(
           flags | (brick == nullptr ? content::kUnknown : brick->flags(kBrickLevel, 0)));
     }

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "core/geometry/vector.hpp"
+#include "core/precision.hpp"
 
 namespace roborun::stages {
 
@@ -18,11 +19,33 @@ class MapView {
   /// True if every cell of the view that touches the box is known to be free. False for an empty or
   /// non-finite box. `lookups` grows by the number of cells and nodes visited.
   [[nodiscard]] virtual bool is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept = 0;
+  /// The same of the whole map at its finest, whatever p1 and v1 of the view are: for what is already being
+  /// flown, which a coarser view must not call blocked. A backend that knows nothing finer answers as
+  /// is_free().
+  [[nodiscard]] virtual bool is_free_at_finest(const Aabb& box_W, std::uint64_t& lookups) const noexcept {
+    return is_free(box_W, lookups);
+  }
   /// The state of the cell of the view that contains the point. Occupied wins over unknown, unknown over
   /// free.
   [[nodiscard]] virtual CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept = 0;
   /// Edge of the cells, cell_size_m(p1).
   [[nodiscard]] virtual double cell_m() const noexcept = 0;
+};
+
+/// is_free_at_finest() of another view, which must outlive it, in the place of is_free().
+class FinestView final : public MapView {
+ public:
+  explicit FinestView(const MapView& view) noexcept : view_(view) {}
+  [[nodiscard]] bool is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
+    return view_.is_free_at_finest(box_W, lookups);
+  }
+  [[nodiscard]] CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept override {
+    return view_.at(p_W, lookups);
+  }
+  [[nodiscard]] double cell_m() const noexcept override { return kFinestCell_m; }
+
+ private:
+  const MapView& view_;
 };
 
 /// True if a vehicle of this radius can move straight from a to b through known free space: boxes of

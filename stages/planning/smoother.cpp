@@ -18,7 +18,8 @@ constexpr double kProfileShare =
     0.60;  // of the acceleration limit: the curve around the profile needs the rest
 constexpr double kCornerCut_m = 0.3;  // how far a corner may be cut: the planner leaves about so much room
 constexpr double kLimitTolerance = 1.05;
-constexpr int kSamples = 12;  // per segment, for the limits
+constexpr double kJerk_mps3 = 15.0;  // of a hop from rest to rest
+constexpr int kSamples = 12;         // per segment, for the limits
 constexpr int kStretchRounds = 10;
 constexpr int kSplitRounds = 6;
 constexpr int kSlowRounds = 4;
@@ -266,11 +267,12 @@ Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, c
 bool append_rest_to_rest(const Vector3& from_W, const Vector3& to_W, const MotionLimits& limits,
                          Trajectory& trajectory) noexcept {
   if (trajectory.segment_count == Trajectory::kMaxSegments) return false;
-  // The polynomial of degree 9 from 0 to 1 with four derivatives zero at both ends, its greatest speed and
-  // acceleration.
+  // The polynomial of degree 9 from 0 to 1 with four derivatives zero at both ends, its greatest speed,
+  // acceleration and jerk. Without a limit on jerk, short hops ask for attitudes that the vehicle overshoots.
   constexpr std::array<double, 5> kRatio{126.0, -420.0, 540.0, -315.0, 70.0};
   constexpr double kPeakSpeed = 2.4609;
   constexpr double kPeakAcceleration = 9.3723;
+  constexpr double kPeakJerk = 78.75;
   const Vector3 way = to_W - from_W;
   const double length_m = way.norm();
   const double before_s = trajectory.duration_s();
@@ -278,6 +280,11 @@ bool append_rest_to_rest(const Vector3& from_W, const Vector3& to_W, const Motio
   segment = {};
   segment.duration_s = std::max({kPeakSpeed * length_m / limits.speed_mps,
                                  std::sqrt(kPeakAcceleration * length_m / limits.acceleration_mps2), 0.1});
+  for (int i = 0; i < 32; ++i) {
+    const double cubed = segment.duration_s * segment.duration_s * segment.duration_s;
+    if (kPeakJerk * length_m <= kJerk_mps3 * cubed) break;
+    segment.duration_s *= 1.1;
+  }
   segment.coefficient[0] = from_W;
   const double T = segment.duration_s;
   double power = T * T * T * T;

@@ -18,12 +18,13 @@ namespace roborun::app {
 /// Of all flights.
 struct RandomWorldsResult {
   int reached{}, collided{};
-  int frames{};                ///< Judged.
-  int without_a_stop{};        ///< Commitments that do not end at rest, or whose way touches an obstacle.
-  double fastest_mps{};        ///< Of the vehicle.
-  double most_tilted_rad{};    ///< Of the vehicle.
-  double fastest_plan_mps{};   ///< Of the committed trajectories.
-  double hardest_plan_mps2{};  ///< Of the committed trajectories.
+  int frames{};                   ///< Judged.
+  int without_a_stop{};           ///< Commitments that do not end at rest, or whose way touches an obstacle.
+  double fastest_mps{};           ///< Of the vehicle.
+  double most_tilted_rad{};       ///< Of the vehicle.
+  double fastest_plan_mps{};      ///< Of the committed trajectories.
+  double hardest_plan_mps2{};     ///< Of the committed trajectories.
+  double most_tilted_plan_rad{};  ///< Which the committed trajectories ask for, without drag and wind.
   std::map<std::string, int> reasons;
 };
 
@@ -81,10 +82,15 @@ inline RandomWorldsResult fly_random_worlds(std::uint64_t first, std::uint64_t c
       const TrajectoryPoint wanted = frame.committed.at(frame.now);
       result.fastest_plan_mps = std::max(result.fastest_plan_mps, wanted.v_W.norm());
       result.hardest_plan_mps2 = std::max(result.hardest_plan_mps2, wanted.a_W.norm());
+      result.most_tilted_plan_rad = std::max(
+          result.most_tilted_plan_rad, std::atan2(wanted.a_W.head<2>().norm(), 9.80665 + wanted.a_W.z()));
       // The way to the stop of each commitment, once: what follows is a part of it.
       if (frame.committed.start_time == committed_at) return;
       committed_at = frame.committed.start_time;
-      if (!ends_in_a_stop(world, frame.committed, seconds(frame.now - committed_at))) ++result.without_a_stop;
+      if (!ends_in_a_stop(world, frame.committed, seconds(frame.now - committed_at))) {
+        ++result.without_a_stop;
+        ADD_FAILURE() << "no stop in world " << n << " at " << seconds(frame.now.time_since_epoch()) << " s";
+      }
     };
     const report::MissionReport report = fly_mission(world, config, {});
     result.reached += report.result.reached_goal ? 1 : 0;
@@ -94,11 +100,10 @@ inline RandomWorldsResult fly_random_worlds(std::uint64_t first, std::uint64_t c
   }
   std::printf(
       "%llu worlds: %d reached the goal, %d collided, %d commitments without a stop; vehicle at most %.2f "
-      "m/s and "
-      "%.1f degrees, trajectories %.2f m/s and %.2f m/s2\n",
+      "m/s and %.1f degrees, trajectories %.2f m/s, %.2f m/s2 and %.1f degrees\n",
       static_cast<unsigned long long>(count), result.reached, result.collided, result.without_a_stop,
       result.fastest_mps, result.most_tilted_rad * 57.29578, result.fastest_plan_mps,
-      result.hardest_plan_mps2);
+      result.hardest_plan_mps2, result.most_tilted_plan_rad * 57.29578);
   for (const auto& [reason, times] : result.reasons) std::printf("  %s: %d\n", reason.c_str(), times);
   return result;
 }
@@ -111,7 +116,8 @@ inline void expect_safe(const RandomWorldsResult& result, int worlds) {
   EXPECT_LE(result.fastest_mps, 6.0 * 1.15);
   EXPECT_LE(result.fastest_plan_mps, 6.0 * 1.10);
   EXPECT_LE(result.hardest_plan_mps2, 4.0 * 1.20);
-  EXPECT_LE(result.most_tilted_rad, 0.62);
+  EXPECT_LE(result.most_tilted_plan_rad, 0.60) << "what the tracker allows";
+  EXPECT_LE(result.most_tilted_rad, 0.60 + 0.10) << "a gust while it is at its limit";
 }
 
 }  // namespace roborun::app

@@ -212,6 +212,33 @@ TEST_F(BrickMapTest, FreeDistanceEndsAtThePillar) {
   EXPECT_TRUE(is_segment_free(sut_->view(), at_, Vector3(4, 0, 5), 0.6, lookups));
 }
 
+TEST_F(BrickMapTest, WhatIsFreeAtTheFinestStaysFreeUnderACoarserAndSmallerView) {
+  const std::array<Vector3, 1> here{at_};
+  ASSERT_EQ(sut_->integrate({scene_.look(at_), 0, kInfinity, here}, unlimited_, result_), Status::kOk);
+  core::Work work;
+  const auto boxes_free = [this](const MapView& view) {
+    std::vector<bool> free;
+    core::CounterRng rng(3);
+    std::uint64_t lookups = 0;
+    for (int n = 0; n < 2000; ++n) {
+      const Vector3 c(rng.uniform(-14, 14), rng.uniform(-14, 14), rng.uniform(1, 9));
+      free.push_back(view.is_free(Aabb::around(c, 0.6), lookups));
+    }
+    return free;
+  };
+  (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
+  const std::vector<bool> fine = boxes_free(sut_->view());
+  (void)sut_->export_view({3, 500.0, at_}, unlimited_, work);
+  const std::vector<bool> coarse = boxes_free(sut_->view());
+  EXPECT_EQ(boxes_free(FinestView(sut_->view())), fine);
+  int lost = 0;
+  for (std::size_t i = 0; i < fine.size(); ++i) {
+    ASSERT_TRUE(fine[i] || !coarse[i]) << "never the other way round";
+    lost += fine[i] && !coarse[i] ? 1 : 0;
+  }
+  EXPECT_GT(lost, 100) << "otherwise nothing was tested";
+}
+
 TEST_F(BrickMapTest, PointCloudAveragesAndProfilesGaps) {
   std::vector<std::byte> block(32U << 20U);
   core::Arena arena(block);
