@@ -45,7 +45,7 @@ Status BrickMap::Config::validate() const noexcept {
 
 std::size_t BrickMap::arena_bytes(const Config& config) noexcept {
   const std::size_t positions = position_count(config.bounds_W);
-  return positions * sizeof(std::int32_t) + positions / 8 * (sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
+  return positions * (2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
          config.max_bricks * (sizeof(Brick) + 2 * sizeof(std::uint32_t)) +
          config.max_frames * DepthPyramid::arena_bytes(config.max_image_side) +
          16 * alignof(std::max_align_t);
@@ -59,8 +59,8 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
       nz_(even_bricks(config.bounds_W.max_W.z() - corner_W_.z())) {
   const std::size_t positions = position_count(config.bounds_W);
   slot_ = arena.take<std::int32_t>(positions, "map positions");
-  order_ = arena.take<std::uint32_t>(positions / 8, "map order");
-  order_key_ = arena.take<std::uint16_t>(positions / 8, "map order keys");
+  order_ = arena.take<std::uint32_t>(positions, "map order");
+  order_key_ = arena.take<std::uint16_t>(positions, "map order keys");
   brick_ = arena.take<Brick>(config.max_bricks, "map bricks");
   brick_pool_ = &arena.last_pool();
   free_list_ = arena.take<std::uint32_t>(config.max_bricks, "map free list");

@@ -80,20 +80,27 @@ class BrickMap final : public OccupancyMap, private MapView {
 
   [[nodiscard]] std::size_t usable_frames(const IntegrationRequest& request,
                                           IntegrationResult& result) noexcept;
-  /// A block of 2^3 bricks: one cell of the coarsest level, and the unit in which v0 is spent.
-  struct Block {
+  /// A unit is what v0 is spent in: a brick, or a block of 2^3 bricks (one cell of the coarsest level) if p0
+  /// is that coarse or v0 is enough for everything in reach.
+  struct Position {
     std::int32_t x, y, z;
   };
-  [[nodiscard]] std::size_t order_blocks(const IntegrationRequest& request) noexcept;
-  [[nodiscard]] std::size_t block_index(const Block& block) const noexcept;
-  [[nodiscard]] Block block_at(std::uint32_t index) const noexcept;
-  [[nodiscard]] Vector3 block_center_W(const Block& block) const noexcept;
-  /// Writes free space, block after block, until budget or v0 is spent. Returns the blocks that were done.
-  [[nodiscard]] std::size_t clear_blocks(std::size_t count, const IntegrationRequest& request,
-                                         core::StageBudget& budget, core::Work& work) noexcept;
+  [[nodiscard]] std::size_t order_units(const IntegrationRequest& request) noexcept;
+  [[nodiscard]] std::size_t unit_index(const Position& unit) const noexcept;
+  [[nodiscard]] Position unit_at(std::uint32_t index) const noexcept;
+  [[nodiscard]] Vector3 unit_center_W(const Position& unit) const noexcept;
+  /// What of a cube lies within the bounds: no more than that is charged to v0.
+  [[nodiscard]] double volume_m3(const Vector3& center_W, double edge_m) const noexcept;
+  /// Writes free space, unit after unit, until budget or v0 is spent. Returns the units that were done.
+  [[nodiscard]] std::size_t clear_units(std::size_t count, const IntegrationRequest& request,
+                                        core::StageBudget& budget, core::Work& work) noexcept;
   /// False when the budget was spent on the way.
-  [[nodiscard]] bool clear_bricks(const Block& block, std::uint8_t cameras, int finest,
-                                  core::StageBudget& budget, core::Work& work) noexcept;
+  [[nodiscard]] bool clear_unit(const Position& unit, std::uint8_t cameras, int finest,
+                                core::StageBudget& budget, core::Work& work) noexcept;
+  [[nodiscard]] bool clear_block(const Position& block, std::uint8_t cameras, int finest,
+                                 core::StageBudget& budget, core::Work& work) noexcept;
+  void clear_brick(const Position& at, std::uint8_t cameras, int finest, core::Work& work) noexcept;
+  void free_unit(const Position& unit) noexcept;
   void free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
   void add_surfaces(const IntegrationRequest& request, double reach_m, core::Work& work) noexcept;
   void free_vehicle() noexcept;
@@ -117,8 +124,9 @@ class BrickMap final : public OccupancyMap, private MapView {
   core::PoolRecord* brick_pool_{nullptr};
   std::span<std::uint32_t> free_list_;
   std::span<std::uint32_t> dirty_;
-  std::span<std::uint32_t> order_;      ///< Blocks near the cameras, nearest to the trajectory first.
-  std::span<std::uint16_t> order_key_;  ///< Of each block of the map.
+  std::span<std::uint32_t> order_;      ///< Units near the cameras, nearest to the trajectory first.
+  std::span<std::uint16_t> order_key_;  ///< Of each unit of the map.
+  int unit_level_{kBrickLevel};
   std::size_t free_count_{0};
   std::size_t dirty_count_{0};
   SightCameras cameras_{};
