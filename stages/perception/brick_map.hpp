@@ -3,9 +3,11 @@
 ///
 /// Free space is found projectively, coarse to fine: a block all of whose pixels see past it is free at once,
 /// a block behind the surface is left alone, the rest is divided until cells of p0. Surfaces are the pixels'
-/// end points, always written at the finest level: that costs no more, and what a coarse block around them
-/// hides stays unknown, hence not free, until a finer look clears it. Free evidence is written first,
-/// surfaces after it, so that a look past a cell never erases a surface seen in the same scan.
+/// end points, written at the finest level whatever p0 is: what a coarse block around them hides stays
+/// unknown, hence not free, until a finer look clears it. Only where p0 is a brick (4.8 m) or more, and in
+/// bricks of which nothing is known, it is enough to note that there is a surface: unknown is not free
+/// either. Free evidence is written first, surfaces after it, so that a look past a cell never erases a
+/// surface seen in the same scan.
 #pragma once
 
 #include <array>
@@ -68,6 +70,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   };
   static constexpr std::int32_t kUnknownBrick = -1;
   static constexpr std::int32_t kFreeBrick = -2;
+  /// Nothing known but that a look at p0 >= 4.8 m met a surface there: occupied as a brick, unknown below.
+  static constexpr std::int32_t kSurfaceBrick = -3;
   struct Node {
     int level;
     std::uint32_t x, y, z;  ///< In cells of `level` from the brick's corner.
@@ -102,10 +106,28 @@ class BrickMap final : public OccupancyMap, private MapView {
   void clear_brick(const Position& at, std::uint8_t cameras, int finest, core::Work& work) noexcept;
   void free_unit(const Position& unit) noexcept;
   void free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
-  void add_surfaces(const IntegrationRequest& request, double reach_m, core::Work& work) noexcept;
+  /// A camera whose surfaces are being written.
+  struct SurfaceCamera {
+    const PosedDepthFrame* posed{};
+    double pitch{};  ///< Of the pixels, at depth 1.
+    bool coarse{};   ///< p0 is a brick or more: surfaces in unknown bricks are noted, not written.
+    PixelLine line{};
+  };
+  void add_surfaces(const IntegrationRequest& request, core::Work& work) noexcept;
+  /// The pixels [u0, u1) of row v.
+  void add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
+                  core::Work& work) noexcept;
+  /// Tile by tile: pixels are looked at where they may end in a brick of which something is known.
+  void add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, core::Work& work) noexcept;
+  [[nodiscard]] bool all_unknown(const TileRow& row, std::size_t x) const noexcept;
+  [[nodiscard]] Brick* surface_brick(std::int32_t bx, std::int32_t by, std::int32_t bz, bool coarse) noexcept;
+  /// Whether v0 reached this brick in this scan.
+  [[nodiscard]] bool paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
   void free_vehicle() noexcept;
   [[nodiscard]] bool cell_of(const Vector3& p_W, Cell& cell) const noexcept;
   [[nodiscard]] std::size_t slot_of(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
+  /// nullptr where nothing is known.
+  [[nodiscard]] const Brick* brick_at(std::size_t position) const noexcept;
   [[nodiscard]] const Brick* visible_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
   [[nodiscard]] Brick* touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
   [[nodiscard]] bool give_up_farthest() noexcept;
@@ -132,7 +154,10 @@ class BrickMap final : public OccupancyMap, private MapView {
   SightCameras cameras_{};
   BrickSeen seen_{};
   SurfaceRow row_{};
-  Brick free_brick_{};  ///< What every position with kFreeBrick reads as.
+  TileRow tiles_{};
+  double reach_m_{0.0};    ///< From the trajectory: v0 was spent up to here.
+  Brick free_brick_{};     ///< What every position with kFreeBrick reads as.
+  Brick surface_brick_{};  ///< The same for kSurfaceBrick.
   std::array<std::size_t, kMaxCameras> frame_of_{};
   std::array<std::optional<DepthPyramid>, kMaxCameras> pyramid_{};
   std::uint64_t known_cells_{0};

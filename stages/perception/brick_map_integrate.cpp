@@ -13,6 +13,15 @@ std::uint32_t in_brick(std::int32_t cell) noexcept {
   return static_cast<std::uint32_t>(cell & (kBrickCells - 1));
 }
 
+/// Tiles of at most half the image that a cell of p0 has at the end of the range.
+int tile_shift(const firmware_if::DepthFrame& frame, int level) noexcept {
+  const double cell_pixels = 0.5 * frame.width * cell_size_m(std::clamp(level, 0, kPrecisionLevels - 1)) /
+                             static_cast<double>(frame.tan_half_fov_ratio * frame.range_m);
+  int shift = 0;
+  while (shift < 3 && cell_pixels >= 4.0 * (1 << shift)) ++shift;
+  return shift;
+}
+
 }  // namespace
 
 std::size_t BrickMap::usable_frames(const IntegrationRequest& request, IntegrationResult& result) noexcept {
@@ -20,7 +29,7 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
   for (std::size_t i = 0; i < request.frames.size(); ++i) {
     const PosedDepthFrame& posed = request.frames[i];
     if (cameras_.count == config_.max_frames || check_frame(posed) != Status::kOk ||
-        pyramid_[cameras_.count]->build(posed.frame) != Status::kOk) {
+        pyramid_[cameras_.count]->build(posed.frame, tile_shift(posed.frame, request.level)) != Status::kOk) {
       ++result.frames_refused;
       continue;
     }
@@ -83,9 +92,9 @@ std::size_t BrickMap::order_units(const IntegrationRequest& request) noexcept {
                       (bricks >> (unit_level_ - kBrickLevel)) - 1);
   };
   const Position first{index(low.x(), corner_W_.x(), nx_), index(low.y(), corner_W_.y(), ny_),
-                    index(low.z(), corner_W_.z(), nz_)};
+                       index(low.z(), corner_W_.z(), nz_)};
   const Position last{index(high.x(), corner_W_.x(), nx_), index(high.y(), corner_W_.y(), ny_),
-                   index(high.z(), corner_W_.z(), nz_)};
+                      index(high.z(), corner_W_.z(), nz_)};
 
   // Counting sort by distance to the trajectory: bounded, stable, no comparison of doubles.
   constexpr std::size_t kBuckets = 256;
@@ -138,7 +147,8 @@ bool BrickMap::clear_block(const Position& block, std::uint8_t cameras, int fine
   const EightSeen eight = see_children(cameras_, {unit_center_W(block), kBlockLevel, cameras});
   ++work.units;
   for (std::int32_t child = 0; child < 8; ++child) {
-    const Position at{2 * block.x + (child & 1), 2 * block.y + ((child >> 1) & 1), 2 * block.z + (child >> 2)};
+    const Position at{2 * block.x + (child & 1), 2 * block.y + ((child >> 1) & 1),
+                      2 * block.z + (child >> 2)};
     if (((eight.free >> child) & 1) != 0) {
       free_brick(at.x, at.y, at.z);
       work.volume_m3 += volume_m3(brick_center_W(at.x, at.y, at.z), kBrick_m);
@@ -188,45 +198,125 @@ void BrickMap::free_unit(const Position& unit) noexcept {
     free_brick(2 * unit.x + (child & 1), 2 * unit.y + ((child >> 1) & 1), 2 * unit.z + (child >> 2));
 }
 
-void BrickMap::add_surfaces(const IntegrationRequest& request, double reach_m, core::Work& work) noexcept {
+bool BrickMap::paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
+  const int up = unit_level_ - kBrickLevel;
+  return order_key_[unit_index({bx >> up, by >> up, bz >> up})] * kOrderStep_m <= reach_m_;
+}
+
+void BrickMap::add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
+                          core::Work& work) noexcept {
+  const firmware_if::DepthFrame& frame = camera.posed->frame;
+  const Vector3 ray_C(1.0, camera.pitch * (0.5 * frame.width - 0.5 - static_cast<double>(u0)),
+                      camera.pitch * (0.5 * frame.height - 0.5 - static_cast<double>(v)));
+  const Vector3 first = camera.posed->X_WC.R_RT * ray_C / kFinestCell_m;
+  PixelLine line = camera.line;
+  for (int axis = 0; axis < 3; ++axis)
+    line.first[static_cast<std::size_t>(axis)] = static_cast<float>(first[axis]);
+  end_cells(line, frame.depth_m.subspan(v * frame.width + u0, u1 - u0), frame.range_m, row_);
   std::size_t last_position = slot_.size();
   Brick* brick = nullptr;
+  for (std::size_t n = 0; n < row_.count; ++n) {
+    const Cell cell{row_.cell[0][n], row_.cell[1][n], row_.cell[2][n]};
+    const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
+    const std::size_t position = slot_of(bx, by, bz);
+    if (position != last_position) {
+      last_position = position;
+      // Beyond the space that v0 paid for nothing is written: neither free nor occupied.
+      brick = paid(bx, by, bz) ? surface_brick(bx, by, bz, camera.coarse) : nullptr;
+    }
+    if (brick == nullptr) continue;
+    brick->add_hit(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)));
+    ++work.units;
+  }
+}
+
+Brick* BrickMap::surface_brick(std::int32_t bx, std::int32_t by, std::int32_t bz, bool coarse) noexcept {
+  std::int32_t& slot = slot_[slot_of(bx, by, bz)];
+  if (!coarse || slot >= 0 || slot == kFreeBrick) return touch(bx, by, bz);
+  slot = kSurfaceBrick;
+  return nullptr;
+}
+
+bool BrickMap::all_unknown(const TileRow& row, std::size_t x) const noexcept {
+  const auto low = [&](std::size_t axis) { return std::max(row.low[axis][x], 0); };
+  const auto high = [&](std::size_t axis, std::int32_t count) {
+    return std::min(row.high[axis][x], count - 1);
+  };
+  for (std::int32_t bz = low(2); bz <= high(2, nz_); ++bz) {
+    for (std::int32_t by = low(1); by <= high(1, ny_); ++by) {
+      for (std::int32_t bx = low(0); bx <= high(0, nx_); ++bx) {
+        const std::int32_t slot = slot_[slot_of(bx, by, bz)];
+        if (slot != kUnknownBrick && slot != kSurfaceBrick) return false;
+      }
+    }
+  }
+  return true;
+}
+
+void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, core::Work& work) noexcept {
+  const firmware_if::DepthFrame& frame = camera.posed->frame;
+  const Matrix3& R = camera.posed->X_WC.R_RT;
+  const DepthPyramid::Level& tiles = image.tiles();
+  const std::size_t side = std::size_t{1} << static_cast<unsigned>(tiles.shift);
+  const auto columns = static_cast<std::size_t>(tiles.width);
+  const double tile_pitch = camera.pitch * static_cast<double>(side);
+  const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kBrick_m;
+  TileLine line;
+  line.steps_per_m = image.steps_per_m();
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto k = static_cast<std::size_t>(axis);
+    line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
+    line.rest[k] = static_cast<float>(origin[axis] - line.origin[k]);
+    line.step[k] = static_cast<float>(-tile_pitch * R(axis, 1) / kBrick_m);
+    line.half[k] =
+        static_cast<float>(0.5 * tile_pitch * (std::fabs(R(axis, 1)) + std::fabs(R(axis, 2))) / kBrick_m);
+  }
+  const DepthPyramid::Entry* entry = tiles.entry;
+  for (std::size_t v = 0; v < frame.height; v += side, entry += columns) {
+    const double half = 0.5 * static_cast<double>(side);
+    const Vector3 ray_C(1.0, camera.pitch * (0.5 * frame.width - half),
+                        camera.pitch * (0.5 * frame.height - half - static_cast<double>(v)));
+    const Vector3 first = R * ray_C / kBrick_m;
+    for (int axis = 0; axis < 3; ++axis)
+      line.first[static_cast<std::size_t>(axis)] = static_cast<float>(first[axis]);
+    tile_boxes(line, entry, columns, tiles_);
+    work.units += columns;
+    for (std::size_t x = 0; x < columns; ++x) {
+      if (!tiles_.surface[x]) continue;
+      if (all_unknown(tiles_, x)) {
+        const Position at{tiles_.brick[0][x], tiles_.brick[1][x], tiles_.brick[2][x]};
+        const bool inside = at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x < nx_ && at.y < ny_ && at.z < nz_;
+        if (inside && paid(at.x, at.y, at.z)) slot_[slot_of(at.x, at.y, at.z)] = kSurfaceBrick;
+        continue;
+      }
+      const std::size_t u1 = std::min<std::size_t>((x + 1) * side, frame.width);
+      for (std::size_t row = v; row < std::min<std::size_t>(v + side, frame.height); ++row)
+        add_pixels(camera, row, x * side, u1, work);
+    }
+  }
+}
+
+void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work) noexcept {
   for (std::size_t i = 0; i < cameras_.count; ++i) {
-    const PosedDepthFrame& posed = request.frames[frame_of_[i]];
-    const firmware_if::DepthFrame& frame = posed.frame;
-    const double pitch = 2.0 * static_cast<double>(frame.tan_half_fov_ratio);
-    const Vector3 origin = (posed.X_WC.p_RT - corner_W_) / kFinestCell_m;
-    PixelLine line;
-    line.low = {low_.x, low_.y, low_.z};
-    line.high = {high_.x, high_.y, high_.z};
+    SurfaceCamera camera;
+    camera.posed = &request.frames[frame_of_[i]];
+    camera.coarse = request.level >= kBrickLevel;
+    const firmware_if::DepthFrame& frame = camera.posed->frame;
+    camera.pitch = 2.0 * static_cast<double>(frame.tan_half_fov_ratio) / frame.width;
+    const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kFinestCell_m;
+    camera.line.low = {low_.x, low_.y, low_.z};
+    camera.line.high = {high_.x, high_.y, high_.z};
     for (int axis = 0; axis < 3; ++axis) {
       const auto k = static_cast<std::size_t>(axis);
-      line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
-      line.rest[k] = static_cast<float>(origin[axis] - line.origin[k]);
-      line.step[k] = static_cast<float>(-pitch / frame.width / kFinestCell_m * posed.X_WC.R_RT(axis, 1));
+      camera.line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
+      camera.line.rest[k] = static_cast<float>(origin[axis] - camera.line.origin[k]);
+      camera.line.step[k] =
+          static_cast<float>(-camera.pitch / kFinestCell_m * camera.posed->X_WC.R_RT(axis, 1));
     }
-    for (int v = 0; v < frame.height; ++v) {
-      const Vector3 ray_C(1.0, pitch * (0.5 - 0.5 / frame.width), pitch * (0.5 - (v + 0.5) / frame.height));
-      const Vector3 first = posed.X_WC.R_RT * ray_C / kFinestCell_m;
-      for (int axis = 0; axis < 3; ++axis)
-        line.first[static_cast<std::size_t>(axis)] = static_cast<float>(first[axis]);
-      const std::size_t width = frame.width;
-      end_cells(line, frame.depth_m.subspan(static_cast<std::size_t>(v) * width, width), frame.range_m, row_);
-      for (std::size_t n = 0; n < row_.count; ++n) {
-        const Cell cell{row_.cell[0][n], row_.cell[1][n], row_.cell[2][n]};
-        const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
-        const std::size_t position = slot_of(bx, by, bz);
-        if (position != last_position) {
-          last_position = position;
-          // Beyond the space that v0 paid for nothing is written: neither free nor occupied.
-          const int up = unit_level_ - kBrickLevel;
-          const bool paid = order_key_[unit_index({bx >> up, by >> up, bz >> up})] * kOrderStep_m <= reach_m;
-          brick = paid ? touch(bx, by, bz) : nullptr;
-        }
-        if (brick == nullptr) continue;
-        brick->add_hit(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)));
-        ++work.units;
-      }
+    if (camera.coarse) {
+      add_tiles(camera, *pyramid_[i], work);
+    } else {
+      for (std::size_t v = 0; v < frame.height; ++v) add_pixels(camera, v, 0, frame.width, work);
     }
   }
 }
@@ -260,10 +350,10 @@ Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget&
   vehicle_W_ = cameras_.camera[0].p_WC;
   const std::size_t count = order_units(request);
   const std::size_t done = clear_units(count, request, budget, result.work);
-  const double reach_m =
+  reach_m_ =
       done < count && done > 0 ? order_key_[order_[done - 1]] * kOrderStep_m : (done < count ? 0.0 : 1e18);
   free_vehicle();
-  add_surfaces(request, reach_m, result.work);
+  add_surfaces(request, result.work);
   refresh_dirty();
   return done < count ? Status::kBudgetSpent : Status::kOk;
 }

@@ -17,11 +17,15 @@ TEST(Brick, MipsSayWhatTheCellsSay) {
   core::CounterRng rng(1);
   auto sut = std::make_unique<Brick>();
   sut->fill(evidence::kUnknown);
-  for (std::int8_t& c : sut->cell) {
-    const auto kind = rng.below(20);
-    c = kind == 0 ? evidence::kUnknown : (kind == 1 ? evidence::kHit : evidence::kFree);
+  std::size_t known = 0;
+  for (std::uint32_t m = 0; m < kCellsPerBrick; ++m) {
+    const auto kind = rng.below(30);
+    if (kind > 0)
+      sut->set_cell(m, kind < 9 ? evidence::kOccupied + static_cast<unsigned>(kind) : evidence::kFree);
+    known += kind > 0 ? 1U : 0U;
   }
   sut->refresh();
+  EXPECT_EQ(sut->known_count, known);
   for (int level = 1; level <= kBrickLevel; ++level) {
     const std::size_t size = std::size_t{1} << (3 * level);
     for (std::uint32_t m = 0; m < kCellsPerBrick / size; ++m) {
@@ -34,18 +38,44 @@ TEST(Brick, MipsSayWhatTheCellsSay) {
 }
 
 TEST(Brick, EvidenceIsBounded) {
-  std::int8_t cell = evidence::kUnknown;
-  cell = evidence::after_miss(cell);
+  unsigned cell = evidence::after_miss(evidence::kUnknown);
   EXPECT_EQ(cell, evidence::kFree);
+  const auto looks_until_free = [](unsigned occupied) {
+    int misses = 0;
+    for (; evidence::is_occupied(occupied); ++misses) occupied = evidence::after_miss(occupied);
+    return misses;
+  };
   cell = evidence::after_hit(cell);
-  EXPECT_GT(cell, 0) << "one surface is enough";
+  EXPECT_TRUE(evidence::is_occupied(cell)) << "one surface is enough";
+  EXPECT_EQ(looks_until_free(cell), 3) << "and survives two looks past it";
   for (int i = 0; i < 100; ++i) cell = evidence::after_hit(cell);
-  int misses = 0;
-  while (cell > 0) {
-    cell = evidence::after_miss(cell);
-    ++misses;
+  EXPECT_EQ(looks_until_free(cell), 8);
+}
+
+TEST(Brick, FreesBlocksAsItWouldTheirCells) {
+  core::CounterRng rng(7);
+  auto sut = std::make_unique<Brick>(), by_cell = std::make_unique<Brick>();
+  for (int level = 0; level <= kBrickLevel; ++level) {
+    for (int n = 0; n < 50; ++n) {
+      for (std::uint32_t m = 0; m < kCellsPerBrick; ++m) {
+        const auto kind = static_cast<unsigned>(rng.below(16));
+        const unsigned cell = kind > evidence::kOccupied ? kind : kind % 2;
+        sut->set_cell(m, cell);
+        by_cell->set_cell(m, cell);
+      }
+      const auto size = std::uint32_t{1} << (3 * level);
+      const auto parent =
+          static_cast<std::uint32_t>(level < kBrickLevel ? rng.below(kCellsPerBrick / size / 8) : 0);
+      const auto blocks = static_cast<std::uint8_t>(level < kBrickLevel ? rng.below(256) : 1);
+      sut->add_free(level, parent, blocks);
+      for (std::uint32_t i = 0; i < 8; ++i) {
+        if (((blocks >> i) & 1) == 0) continue;
+        for (std::uint32_t m = (8 * parent + i) * size; m < (8 * parent + i + 1) * size; ++m)
+          by_cell->set_cell(m, evidence::after_miss(by_cell->cell(m)));
+      }
+      ASSERT_EQ(sut->word, by_cell->word) << level;
+    }
   }
-  EXPECT_LE(misses, 10);
 }
 
 TEST(Morton, InterleavesThreeAxes) {
