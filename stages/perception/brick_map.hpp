@@ -113,13 +113,18 @@ class BrickMap final : public OccupancyMap, private MapView {
     bool coarse{};   ///< p0 is a brick or more: surfaces in unknown bricks are noted, not written.
     PixelLine line{};
   };
+  /// Of column u and row v of the image, in edges, for a depth of 1.
+  [[nodiscard]] static std::array<float, 3> direction(const SurfaceCamera& camera, double u, double v,
+                                                      double edge_m) noexcept;
   void add_surfaces(const IntegrationRequest& request, core::Work& work) noexcept;
   /// The pixels [u0, u1) of row v.
   void add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
                   core::Work& work) noexcept;
   /// Tile by tile: pixels are looked at where they may end in a brick of which something is known.
   void add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, core::Work& work) noexcept;
-  [[nodiscard]] bool all_unknown(const TileRow& row, std::size_t x) const noexcept;
+  /// True if nothing is known of all bricks in which this tile of tiles_ may end: then that is all to be
+  /// done.
+  [[nodiscard]] bool note_surface(std::size_t tile) noexcept;
   [[nodiscard]] Brick* surface_brick(std::int32_t bx, std::int32_t by, std::int32_t bz, bool coarse) noexcept;
   /// Whether v0 reached this brick in this scan.
   [[nodiscard]] bool paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;

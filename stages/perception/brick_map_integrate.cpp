@@ -198,6 +198,18 @@ void BrickMap::free_unit(const Position& unit) noexcept {
     free_brick(2 * unit.x + (child & 1), 2 * unit.y + ((child >> 1) & 1), 2 * unit.z + (child >> 2));
 }
 
+std::array<float, 3> BrickMap::direction(const SurfaceCamera& camera, double u, double v,
+                                         double edge_m) noexcept {
+  const Matrix3& R = camera.posed->X_WC.R_RT;
+  const double y = camera.pitch * (0.5 * camera.posed->frame.width - u);
+  const double z = camera.pitch * (0.5 * camera.posed->frame.height - v);
+  std::array<float, 3> result{};
+  for (int axis = 0; axis < 3; ++axis)
+    result[static_cast<std::size_t>(axis)] =
+        static_cast<float>((R(axis, 0) + R(axis, 1) * y + R(axis, 2) * z) / edge_m);
+  return result;
+}
+
 bool BrickMap::paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
   const int up = unit_level_ - kBrickLevel;
   return order_key_[unit_index({bx >> up, by >> up, bz >> up})] * kOrderStep_m <= reach_m_;
@@ -206,12 +218,8 @@ bool BrickMap::paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noe
 void BrickMap::add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
                           core::Work& work) noexcept {
   const firmware_if::DepthFrame& frame = camera.posed->frame;
-  const Vector3 ray_C(1.0, camera.pitch * (0.5 * frame.width - 0.5 - static_cast<double>(u0)),
-                      camera.pitch * (0.5 * frame.height - 0.5 - static_cast<double>(v)));
-  const Vector3 first = camera.posed->X_WC.R_RT * ray_C / kFinestCell_m;
   PixelLine line = camera.line;
-  for (int axis = 0; axis < 3; ++axis)
-    line.first[static_cast<std::size_t>(axis)] = static_cast<float>(first[axis]);
+  line.first = direction(camera, static_cast<double>(u0) + 0.5, static_cast<double>(v) + 0.5, kFinestCell_m);
   end_cells(line, frame.depth_m.subspan(v * frame.width + u0, u1 - u0), frame.range_m, row_);
   std::size_t last_position = slot_.size();
   Brick* brick = nullptr;
@@ -237,10 +245,11 @@ Brick* BrickMap::surface_brick(std::int32_t bx, std::int32_t by, std::int32_t bz
   return nullptr;
 }
 
-bool BrickMap::all_unknown(const TileRow& row, std::size_t x) const noexcept {
-  const auto low = [&](std::size_t axis) { return std::max(row.low[axis][x], 0); };
-  const auto high = [&](std::size_t axis, std::int32_t count) {
-    return std::min(row.high[axis][x], count - 1);
+bool BrickMap::note_surface(std::size_t tile) noexcept {
+  if (!tiles_.surface[tile]) return true;
+  const auto low = [&](std::size_t axis) { return std::max(tiles_.low[axis][tile], 0); };
+  const auto high = [&](std::size_t axis, std::int32_t n) {
+    return std::min(tiles_.high[axis][tile], n - 1);
   };
   for (std::int32_t bz = low(2); bz <= high(2, nz_); ++bz) {
     for (std::int32_t by = low(1); by <= high(1, ny_); ++by) {
@@ -250,6 +259,9 @@ bool BrickMap::all_unknown(const TileRow& row, std::size_t x) const noexcept {
       }
     }
   }
+  const Position at{tiles_.brick[0][tile], tiles_.brick[1][tile], tiles_.brick[2][tile]};
+  const bool inside = at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x < nx_ && at.y < ny_ && at.z < nz_;
+  if (inside && paid(at.x, at.y, at.z)) slot_[slot_of(at.x, at.y, at.z)] = kSurfaceBrick;
   return true;
 }
 
@@ -274,24 +286,16 @@ void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image,
   const DepthPyramid::Entry* entry = tiles.entry;
   for (std::size_t v = 0; v < frame.height; v += side, entry += columns) {
     const double half = 0.5 * static_cast<double>(side);
-    const Vector3 ray_C(1.0, camera.pitch * (0.5 * frame.width - half),
-                        camera.pitch * (0.5 * frame.height - half - static_cast<double>(v)));
-    const Vector3 first = R * ray_C / kBrick_m;
-    for (int axis = 0; axis < 3; ++axis)
-      line.first[static_cast<std::size_t>(axis)] = static_cast<float>(first[axis]);
+    line.first = direction(camera, half, static_cast<double>(v) + half, kBrick_m);
     tile_boxes(line, entry, columns, tiles_);
     work.units += columns;
     for (std::size_t x = 0; x < columns; ++x) {
-      if (!tiles_.surface[x]) continue;
-      if (all_unknown(tiles_, x)) {
-        const Position at{tiles_.brick[0][x], tiles_.brick[1][x], tiles_.brick[2][x]};
-        const bool inside = at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x < nx_ && at.y < ny_ && at.z < nz_;
-        if (inside && paid(at.x, at.y, at.z)) slot_[slot_of(at.x, at.y, at.z)] = kSurfaceBrick;
-        continue;
-      }
-      const std::size_t u1 = std::min<std::size_t>((x + 1) * side, frame.width);
+      if (note_surface(x)) continue;
+      std::size_t end = x + 1;
+      while (end < columns && !note_surface(end)) ++end;
       for (std::size_t row = v; row < std::min<std::size_t>(v + side, frame.height); ++row)
-        add_pixels(camera, row, x * side, u1, work);
+        add_pixels(camera, row, x * side, std::min<std::size_t>(end * side, frame.width), work);
+      x = end;
     }
   }
 }

@@ -169,10 +169,57 @@ TEST_F(BrickMapTest, ACoarseLookNeverClearsAFineSurface) {
   }
   ASSERT_GT(surface.size(), 5U);
   for (int i = 0; i < 20; ++i)
-    (void)sut_->integrate({frames, 2 + i % 3, kInfinity, here}, unlimited_, result_);
+    (void)sut_->integrate({frames, 2 + i % 4, kInfinity, here}, unlimited_, result_);
   (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
   for (const Vector3& p : surface)
     EXPECT_EQ(sut_->view().at(p, lookups), CellState::kOccupied) << p.transpose();
+}
+
+TEST_F(BrickMapTest, ACoarseLookSeesWhatAppearsInFreeSpace) {
+  const std::array<Vector3, 1> here{at_};
+  test::Scene before = scene_;
+  before.solid.resize(1);  // the floor
+  for (int level = 1; level < kPrecisionLevels; ++level) {
+    std::vector<std::byte> block(64U << 20U);
+    core::Arena arena(block);
+    BrickMap map(config_, arena);
+    (void)map.integrate({before.look(at_), 0, kInfinity, here}, unlimited_, result_);
+    core::Work work;
+    (void)map.export_view({0, kInfinity, at_}, unlimited_, work);
+    std::uint64_t lookups = 0;
+    ASSERT_TRUE(is_segment_free(map.view(), at_, Vector3(7, 0.2, 5), 0.3, lookups));
+    ASSERT_EQ(map.integrate({scene_.look(at_), level, kInfinity, here}, unlimited_, result_), Status::kOk);
+    (void)map.export_view({0, kInfinity, at_}, unlimited_, work);
+    EXPECT_FALSE(is_segment_free(map.view(), at_, Vector3(7, 0.2, 5), 0.3, lookups)) << level;
+    EXPECT_TRUE(is_segment_free(map.view(), at_, Vector3(5, 0.2, 5), 0.3, lookups)) << "only where it is";
+  }
+}
+
+TEST_F(BrickMapTest, ACoarseLookNotesSurfacesInUnknownBricksUntilAFinerOne) {
+  const std::array<Vector3, 1> here{at_};
+  const auto frames = scene_.look(at_);
+  const auto cells = [this](int level) {
+    core::Work work;
+    (void)sut_->export_view({level, kInfinity, at_}, unlimited_, work);
+    std::array<int, 3> count{};
+    std::uint64_t lookups = 0;
+    for (double x = -13.35; x < 14; x += 0.3)
+      for (double y = -13.35; y < 14; y += 0.3)
+        for (const double z : {-0.15, 0.15})
+          ++count[static_cast<std::size_t>(sut_->view().at(Vector3(x, y, z), lookups))];
+    return count;
+  };
+  constexpr auto kOccupied = static_cast<std::size_t>(CellState::kOccupied),
+                 kFree = static_cast<std::size_t>(CellState::kFree);
+  ASSERT_EQ(sut_->integrate({frames, kBrickLevel, kInfinity, here}, unlimited_, result_), Status::kOk);
+  const std::uint64_t known = sut_->known_cells();
+  EXPECT_GT(cells(kBrickLevel)[kOccupied], 6000) << "the floor, in the upper or the lower of 2 x 8281 cells";
+  EXPECT_EQ(cells(kBrickLevel)[kFree], 0);
+  EXPECT_EQ(cells(0)[kOccupied], 0) << "where in the brick is not known";
+  (void)sut_->integrate({frames, kBrickLevel, kInfinity, here}, unlimited_, result_);
+  EXPECT_EQ(sut_->known_cells(), known) << "the same look again changes nothing";
+  (void)sut_->integrate({frames, 0, kInfinity, here}, unlimited_, result_);
+  EXPECT_GT(cells(0)[kOccupied], 1000);
 }
 
 class SmallBrickMap : public BrickMapTest {
@@ -296,8 +343,10 @@ TEST(DepthPyramid, BoundsEveryRectangle) {
   std::vector<std::byte> block(1U << 20U);
   core::Arena arena(block);
   DepthPyramid sut(arena, 96);
-  ASSERT_EQ(sut.build(frame), Status::kOk);
-  for (int n = 0; n < 2000; ++n) {
+  for (int n = 0; n < 4000; ++n) {
+    if (n % 1000 == 0) {
+      ASSERT_EQ(sut.build(frame, n / 1000), Status::kOk);
+    }
     const int u0 = static_cast<int>(rng.below(96)), v0 = static_cast<int>(rng.below(80));
     const int u1 = std::min(95, u0 + static_cast<int>(rng.below(40))),
               v1 = std::min(79, v0 + static_cast<int>(rng.below(40)));
