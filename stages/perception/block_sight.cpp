@@ -160,7 +160,8 @@ HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Ma
 
   // One level for all eight blocks, so that the result does not depend on how many are done at once.
   const std::int32_t side = hn::GetLane(hn::MaxOfLanes(di, longest)) + 1;
-  const DepthPyramid::Level& level = c.pyramid->level(DepthPyramid::level_for(side));
+  const DepthPyramid::Level& level =
+      c.pyramid->level(std::max(DepthPyramid::level_for(side), c.pyramid->first_level()));
   unsigned sees_past = 0, hidden = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     const auto first = [&](const std::int32_t* from) {
@@ -389,36 +390,108 @@ void end_cells_lanes(const PixelLine& line, std::span<const float> depth_m, floa
   }
 }
 
-std::size_t depth_steps_lanes(std::span<const float> depth_m, float range_m, float steps_per_m,
-                              DepthPyramid::Entry* entry) {
+bool tile_steps_lanes(const DepthStrip& strip, int shift, DepthPyramid::Entry* entry) {
   const Floats d;
   const Ints di;
-  const auto range = hn::Set(d, range_m);
-  const auto all = hn::Set(di, DepthPyramid::kMaxSteps);
-  std::size_t lost = 0;
-  const auto some = [&](const float* depth, std::int32_t* to) {
-    const auto raw = hn::LoadU(d, depth);
-    const auto known = hn::Gt(raw, hn::Zero(d));
-    lost += hn::Lanes(d) - hn::CountTrue(d, known);
-    const auto z = hn::IfThenElseZero(known, raw);
-    const auto within = hn::RebindMask(di, hn::Lt(z, range));
-    const auto steps = hn::ConvertTo(di, hn::Mul(hn::Min(z, range), hn::Set(d, steps_per_m)));
-    const auto least = hn::IfThenElse(within, steps, all);
-    const auto not_most = hn::IfThenElseZero(within, hn::Sub(hn::Sub(all, steps), hn::Set(di, 1)));
-    hn::StoreU(hn::Or(least, hn::ShiftLeft<16>(not_most)), di, to);
-  };
-  auto* to = reinterpret_cast<std::int32_t*>(entry);
   const std::size_t lanes = hn::Lanes(d);
-  std::size_t i = 0;
-  for (; i + lanes <= depth_m.size(); i += lanes) some(depth_m.data() + i, to + i);
-  if (i < depth_m.size()) {
-    float tail[8];
-    std::int32_t out[8];
-    for (std::size_t k = 0; k < 8; ++k) tail[k] = i + k < depth_m.size() ? depth_m[i + k] : range_m;
-    some(tail, out);
-    for (std::size_t k = 0; i + k < depth_m.size(); ++k) to[i + k] = out[k];
+  const auto range = hn::Set(d, strip.range_m), scale = hn::Set(d, strip.steps_per_m);
+  const auto all = hn::Set(di, DepthPyramid::kMaxSteps), one = hn::Set(di, 1);
+  const auto none = hn::Set(d, 2.0F * kMaxRange_m);
+  alignas(32) std::int32_t column[DepthPyramid::kMaxPixels + 8];
+  bool complete = true;
+  const auto some = [&](const float* depth, std::size_t stride, std::size_t u) {
+    // Steps grow with depth, so that the least and the most can be found first. No information: no part.
+    auto least = none, most = hn::Zero(d);
+    auto known = hn::Gt(hn::LoadU(d, depth), hn::Zero(d));
+    for (std::size_t v = 0; v < strip.rows; ++v) {
+      const auto raw = hn::LoadU(d, depth + v * stride);
+      const auto known_here = hn::Gt(raw, hn::Zero(d));
+      known = hn::And(known, known_here);
+      least = hn::Min(least, hn::IfThenElse(known_here, raw, none));
+      most = hn::Max(most, hn::IfThenElseZero(known_here, raw));
+    }
+    complete = complete && hn::AllTrue(d, known);
+    const auto steps = [&](auto z) { return hn::ConvertTo(di, hn::Mul(hn::Min(z, range), scale)); };
+    const auto within = [&](auto z) { return hn::RebindMask(di, hn::Lt(z, range)); };
+    const auto least_steps = hn::IfThenElse(within(least), steps(least), all);
+    const auto not_most = hn::IfThenElseZero(within(most), hn::Sub(hn::Sub(all, steps(most)), one));
+    const auto nothing = hn::RebindMask(di, hn::Eq(most, hn::Zero(d)));
+    hn::StoreU(hn::Or(least_steps, hn::ShiftLeft<16>(hn::IfThenElse(nothing, all, not_most))), di,
+               column + u);
+  };
+  std::size_t u = 0;
+  for (; u + lanes <= strip.width; u += lanes) some(strip.depth_m + u, strip.width, u);
+  if (u < strip.width) {
+    float tail[8 * kMaxTile] = {};
+    for (std::size_t v = 0; v < strip.rows; ++v)
+      for (std::size_t i = 0; i < 8; ++i)
+        tail[8 * v + i] = strip.depth_m[v * strip.width + std::min(u + i, strip.width - 1)];
+    some(tail, 8, u);
   }
-  return lost;
+  const std::size_t side = std::size_t{1} << static_cast<unsigned>(shift);
+  for (std::size_t x = 0; x * side < strip.width; ++x) {
+    std::int32_t least = DepthPyramid::kMaxSteps, not_most = DepthPyramid::kMaxSteps;
+    for (std::size_t i = x * side; i < std::min((x + 1) * side, strip.width); ++i) {
+      least = std::min(least, column[i] & 0xFFFF);
+      not_most = std::min(not_most, column[i] >> 16);
+    }
+    entry[x] = {static_cast<std::int16_t>(least), static_cast<std::int16_t>(not_most)};
+  }
+  return complete;
+}
+
+PixelCounts pixel_counts_lanes(std::span<const float> depth_m, float range_m) {
+  const Floats d;
+  const std::size_t lanes = hn::Lanes(d);
+  const auto range = hn::Set(d, range_m);
+  PixelCounts counts;
+  std::size_t i = 0;
+  for (; i + lanes <= depth_m.size(); i += lanes) {
+    const auto known = hn::Gt(hn::LoadU(d, depth_m.data() + i), hn::Zero(d));
+    counts.informed += hn::CountTrue(d, known);
+    counts.surfaces += hn::CountTrue(d, hn::And(known, hn::Lt(hn::LoadU(d, depth_m.data() + i), range)));
+  }
+  for (; i < depth_m.size(); ++i) {
+    counts.informed += depth_m[i] > 0.0F ? 1U : 0U;
+    counts.surfaces += depth_m[i] > 0.0F && depth_m[i] < range_m ? 1U : 0U;
+  }
+  return counts;
+}
+
+void tile_boxes_lanes(const TileLine& line, const DepthPyramid::Entry* entry, std::size_t count,
+                      TileRow& row) {
+  const Floats d;
+  const Ints di;
+  constexpr float kBias = 4096.0F;    // makes truncation round down
+  constexpr float kRounding = 1e-3F;  // of a brick
+  const auto m_per_step = hn::Set(d, 1.0F / line.steps_per_m);
+  for (std::size_t x = 0; x < count; x += hn::Lanes(d)) {
+    alignas(32) std::int32_t raw[8] = {};
+    for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+      const DepthPyramid::Entry& e = entry[std::min(x + i, count - 1)];
+      raw[i] = e.least_steps | (static_cast<std::int32_t>(e.not_most_steps) << 16U);
+      row.surface[x + i] = e.least_steps < DepthPyramid::kMaxSteps;
+    }
+    const auto steps = hn::Load(di, raw);
+    const auto near = hn::Mul(hn::ConvertTo(d, hn::And(steps, hn::Set(di, 0xFFFF))), m_per_step);
+    const auto most = hn::Sub(hn::Set(di, DepthPyramid::kMaxSteps), hn::ShiftRight<16>(steps));
+    const auto far = hn::Mul(hn::ConvertTo(d, most), m_per_step);
+    const auto column = hn::ConvertTo(d, hn::Iota(di, static_cast<std::int32_t>(x)));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto center = hn::Add(hn::Set(d, line.first[axis]), hn::Mul(column, hn::Set(d, line.step[axis])));
+      const auto half = hn::Set(d, line.half[axis]);
+      const auto low = hn::Sub(center, half), high = hn::Add(center, half);
+      const auto brick = [&](auto offset, float margin) {
+        return hn::Add(hn::ConvertTo(di, hn::Add(offset, hn::Set(d, line.rest[axis] + kBias + margin))),
+                       hn::Set(di, line.origin[axis] - static_cast<std::int32_t>(kBias)));
+      };
+      hn::Store(brick(hn::Min(hn::Mul(low, near), hn::Mul(low, far)), -kRounding), di,
+                row.low[axis].data() + x);
+      hn::Store(brick(hn::Max(hn::Mul(high, near), hn::Mul(high, far)), kRounding), di,
+                row.high[axis].data() + x);
+      hn::Store(brick(hn::Mul(center, near), 0.0F), di, row.brick[axis].data() + x);
+    }
+  }
 }
 
 void least_of_four_lanes(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below,
@@ -445,36 +518,40 @@ void least_of_four_lanes(const DepthPyramid::Entry* above, const DepthPyramid::E
   }
 }
 
-std::size_t brick_flags_lanes(const std::int8_t* cell, std::uint8_t* mip) {
+std::size_t brick_flags_lanes(const std::uint64_t* word, std::uint8_t* mip) {
+  // Of eight cells, half bytes: bit 0 alone is free, bit 3 is occupied, 0 is unknown.
+  constexpr std::uint32_t kOnes = 0x11111111U;
   std::size_t unknown = 0;
   std::size_t i = 0;
 #if HWY_TARGET != HWY_SCALAR
-  const hn::CappedTag<std::int8_t, 32> d;
+  const hn::CappedTag<std::uint32_t, 8> d;
   const hn::Repartition<std::uint64_t, decltype(d)> d64;
-  const auto is_unknown = hn::Set(d, evidence::kUnknown), zero = hn::Zero(d);
-  const auto flag = [&](std::uint8_t value) { return hn::Set(d, static_cast<std::int8_t>(value)); };
-  for (; i < kCellsPerBrick; i += hn::Lanes(d)) {
-    const auto v = hn::LoadU(d, cell + i);
-    const auto unknown_here = hn::Eq(v, is_unknown);
-    unknown += hn::CountTrue(d, unknown_here);
-    const auto known = hn::IfThenElse(hn::Gt(v, zero), flag(content::kOccupied), flag(content::kFree));
-    auto word = hn::BitCast(d64, hn::IfThenElse(unknown_here, flag(content::kUnknown), known));
-    word = hn::Or(word, hn::ShiftRight<32>(word));
-    word = hn::Or(word, hn::ShiftRight<16>(word));
-    word = hn::Or(word, hn::ShiftRight<8>(word));
-    alignas(32) std::uint64_t words[4];
-    hn::Store(word, d64, words);
-    for (std::size_t k = 0; k < hn::Lanes(d64); ++k) mip[i / 8 + k] = static_cast<std::uint8_t>(words[k]);
+  const hn::Rebind<std::uint8_t, decltype(d)> d8;
+  const auto ones = hn::Set(d, kOnes), zero = hn::Zero(d);
+  const auto flag = [&](auto cells, std::uint8_t value) {
+    return hn::IfThenElse(hn::Eq(cells, zero), zero, hn::Set(d, value));
+  };
+  auto sum = zero;
+  for (; i < kCellsPerBrick / 8; i += hn::Lanes(d)) {
+    const auto cells = hn::BitCast(d, hn::LoadU(d64, word + i / 2));
+    const auto occupied = hn::And(hn::ShiftRight<3>(cells), ones);
+    const auto free = hn::AndNot(occupied, hn::And(cells, ones));
+    const auto unknown_here = hn::AndNot(hn::Or(occupied, free), ones);
+    sum = hn::Add(sum, hn::ShiftRight<28>(hn::Mul(unknown_here, ones)));
+    const auto flags = hn::Or(flag(unknown_here, content::kUnknown),
+                              hn::Or(flag(occupied, content::kOccupied), flag(free, content::kFree)));
+    hn::StoreU(hn::TruncateTo(d8, flags), d8, mip + i);
   }
+  unknown = hn::GetLane(hn::SumOfLanes(d, sum));
 #endif
-  for (; i < kCellsPerBrick; i += 8) {
-    unsigned flags = 0;
-    for (std::size_t k = i; k < i + 8; ++k) {
-      const bool known = cell[k] != evidence::kUnknown;
-      flags |= !known ? content::kUnknown : (cell[k] > 0 ? content::kOccupied : content::kFree);
-      unknown += known ? 0U : 1U;
-    }
-    mip[i / 8] = static_cast<std::uint8_t>(flags);
+  for (; i < kCellsPerBrick / 8; ++i) {
+    const auto cells = static_cast<std::uint32_t>(word[i / 2] >> (32U * (i % 2)));
+    const std::uint32_t occupied = (cells >> 3U) & kOnes, free = cells & kOnes & ~occupied;
+    const std::uint32_t unknown_here = kOnes & ~(occupied | free);
+    unknown += (unknown_here * kOnes) >> 28U;
+    mip[i] = static_cast<std::uint8_t>((unknown_here != 0 ? content::kUnknown : 0U) |
+                                       (occupied != 0 ? content::kOccupied : 0U) |
+                                       (free != 0 ? content::kFree : 0U));
   }
   return kCellsPerBrick - unknown;
 }
@@ -489,7 +566,9 @@ HWY_EXPORT(see_blocks_lanes);
 HWY_EXPORT(see_children_lanes);
 HWY_EXPORT(see_brick_lanes);
 HWY_EXPORT(end_cells_lanes);
-HWY_EXPORT(depth_steps_lanes);
+HWY_EXPORT(tile_steps_lanes);
+HWY_EXPORT(pixel_counts_lanes);
+HWY_EXPORT(tile_boxes_lanes);
 HWY_EXPORT(least_of_four_lanes);
 HWY_EXPORT(brick_flags_lanes);
 
@@ -542,9 +621,17 @@ void end_cells(const PixelLine& line, std::span<const float> depth_m, float rang
   HWY_DYNAMIC_DISPATCH(end_cells_lanes)(line, depth_m, range_m, row);
 }
 
-std::size_t depth_steps(std::span<const float> depth_m, float range_m, float steps_per_m,
-                        DepthPyramid::Entry* entry) noexcept {
-  return HWY_DYNAMIC_DISPATCH(depth_steps_lanes)(depth_m, range_m, steps_per_m, entry);
+bool tile_steps(const DepthStrip& strip, int shift, DepthPyramid::Entry* entry) noexcept {
+  return HWY_DYNAMIC_DISPATCH(tile_steps_lanes)(strip, shift, entry);
+}
+
+PixelCounts pixel_counts(std::span<const float> depth_m, float range_m) noexcept {
+  return HWY_DYNAMIC_DISPATCH(pixel_counts_lanes)(depth_m, range_m);
+}
+
+void tile_boxes(const TileLine& line, const DepthPyramid::Entry* entry, std::size_t count,
+                TileRow& row) noexcept {
+  HWY_DYNAMIC_DISPATCH(tile_boxes_lanes)(line, entry, count, row);
 }
 
 void least_of_four(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride,
@@ -552,8 +639,8 @@ void least_of_four(const DepthPyramid::Entry* above, const DepthPyramid::Entry* 
   HWY_DYNAMIC_DISPATCH(least_of_four_lanes)(above, below, stride, count, to);
 }
 
-std::size_t brick_flags(const std::array<std::int8_t, kCellsPerBrick>& cell, std::uint8_t* mip) noexcept {
-  return HWY_DYNAMIC_DISPATCH(brick_flags_lanes)(cell.data(), mip);
+std::size_t brick_flags(const std::array<std::uint64_t, Brick::kWords>& word, std::uint8_t* mip) noexcept {
+  return HWY_DYNAMIC_DISPATCH(brick_flags_lanes)(word.data(), mip);
 }
 
 std::int64_t sight_instruction_sets() noexcept { return hwy::SupportedTargets(); }

@@ -101,15 +101,49 @@ struct SurfaceRow {
 void end_cells(const PixelLine& line, std::span<const float> depth_m, float range_m,
                SurfaceRow& row) noexcept;
 
-/// Whole steps of the visible depths: see DepthPyramid. Returns how many pixels have no information.
-[[nodiscard]] std::size_t depth_steps(std::span<const float> depth_m, float range_m, float steps_per_m,
-                                      DepthPyramid::Entry* entry) noexcept;
+inline constexpr std::size_t kMaxTile = 8;  ///< Pixels on a side.
+/// Some rows of an image.
+struct DepthStrip {
+  const float* depth_m{};
+  std::size_t width{}, rows{};  ///< Pixels; at most kMaxTile rows.
+  float range_m{}, steps_per_m{};
+};
+/// Bounds of tiles of 2^shift columns and all rows of the strip, in steps of DepthPyramid. A pixel without
+/// information has no part in them: then false.
+[[nodiscard]] bool tile_steps(const DepthStrip& strip, int shift, DepthPyramid::Entry* entry) noexcept;
+
+/// Of an image: pixels with information, and those of them that show a surface.
+struct PixelCounts {
+  std::size_t informed{}, surfaces{};
+};
+[[nodiscard]] PixelCounts pixel_counts(std::span<const float> depth_m, float range_m) noexcept;
+
+/// A row of tiles in space, in bricks: as PixelLine, for the tiles' middles. `half`: how much a direction
+/// differs at most within a tile.
+struct TileLine {
+  std::array<std::int32_t, 3> origin{};
+  std::array<float, 3> rest{}, first{}, step{}, half{};
+  float steps_per_m{};
+};
+/// For each tile: whether it shows a surface; then in which bricks, at most, and in which one for the
+/// nearest.
+struct TileRow {
+  static constexpr std::size_t kMost = DepthPyramid::kMaxPixels + 8;
+  using Bricks = std::array<std::array<std::int32_t, kMost>, 3>;
+  alignas(32) Bricks low{};
+  alignas(32) Bricks high{};
+  alignas(32) Bricks brick{};
+  std::array<bool, kMost> surface{};
+};
+void tile_boxes(const TileLine& line, const DepthPyramid::Entry* entry, std::size_t count,
+                TileRow& row) noexcept;
+
 /// to[x] = the least of fine[stride x + {0, next}] of two rows; `count` times.
 void least_of_four(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride,
                    std::size_t count, DepthPyramid::Entry* to) noexcept;
 
 /// mip[i] = content flags of the cells 8 i .. 8 i + 7 of a brick. Returns how many cells are known.
-[[nodiscard]] std::size_t brick_flags(const std::array<std::int8_t, kCellsPerBrick>& cell,
+[[nodiscard]] std::size_t brick_flags(const std::array<std::uint64_t, Brick::kWords>& word,
                                       std::uint8_t* mip) noexcept;
 
 /// Instruction sets that see_*() can use here, and the use of one of them only (tests); all again with ~0.

@@ -1,5 +1,5 @@
-/// A brick: 16^3 cells of 0.3 m in Morton order, and one mip level for each coarser precision up to its
-/// own 4.8 m.
+/// A brick: 16^3 cells of 0.3 m in Morton order, half a byte each, and one mip level for each coarser
+/// precision up to its own 4.8 m.
 #pragma once
 
 #include <array>
@@ -15,22 +15,23 @@ inline constexpr int kBrickCells = 1 << kBrickLevel;  ///< Per edge.
 inline constexpr std::size_t kCellsPerBrick = 4096;
 inline constexpr double kBrick_m = cell_size_m(kBrickLevel);
 
-/// What a cell holds: kUnknown, or evidence: negative is free, positive occupied. One look through free space
-/// makes it free; one surface makes it occupied whatever was there; kMost / kMiss = 10 looks through it clear
-/// the oldest obstacle.
+/// What a cell holds, four bits: unknown, free, or occupied with evidence 1 .. 8. One look through free space
+/// makes it free; one surface makes it occupied whatever was there; kMost looks through it clear the oldest
+/// obstacle, kHit looks one that was seen once.
 namespace evidence {
-inline constexpr std::int8_t kUnknown = -128;
-inline constexpr std::int8_t kFree = -1;
-inline constexpr std::int8_t kHit = 6;
-inline constexpr std::int8_t kMiss = 2;
-inline constexpr std::int8_t kMost = 20;
+inline constexpr unsigned kUnknown = 0;
+inline constexpr unsigned kFree = 1;
+inline constexpr unsigned kOccupied = 7;  ///< Plus the evidence: bit 3 is set of what is occupied alone.
+inline constexpr unsigned kHit = 3;
+inline constexpr unsigned kMost = 8;
 
-[[nodiscard]] constexpr std::int8_t after_hit(std::int8_t cell) noexcept {
-  const int base = cell > 0 ? cell : 0;
-  return static_cast<std::int8_t>(base + kHit > kMost ? kMost : base + kHit);
+[[nodiscard]] constexpr bool is_occupied(unsigned cell) noexcept { return cell > kOccupied; }
+[[nodiscard]] constexpr unsigned after_hit(unsigned cell) noexcept {
+  const unsigned next = (is_occupied(cell) ? cell : kOccupied) + kHit;
+  return next > kOccupied + kMost ? kOccupied + kMost : next;
 }
-[[nodiscard]] constexpr std::int8_t after_miss(std::int8_t cell) noexcept {
-  return cell > kMiss ? static_cast<std::int8_t>(cell - kMiss) : kFree;
+[[nodiscard]] constexpr unsigned after_miss(unsigned cell) noexcept {
+  return cell > kOccupied + 1 ? cell - 1 : kFree;
 }
 }  // namespace evidence
 
@@ -42,28 +43,31 @@ inline constexpr std::uint8_t kFree = 4;  ///< An entry that equals kFree is fre
 }  // namespace content
 
 struct Brick {
-  std::array<std::int8_t, kCellsPerBrick> cell{};    ///< Level 0, Morton order: the truth.
+  static constexpr std::size_t kCellsPerWord = 16;
+  static constexpr std::size_t kWords = kCellsPerBrick / kCellsPerWord;
+
+  /// Level 0, the truth. Cell with Morton index m: bits 4 (m % 16) .. of word m / 16.
+  std::array<std::uint64_t, kWords> word{};
   std::array<std::uint8_t, 512 + 64 + 8 + 1> mip{};  ///< Levels 1 to 4, derived by refresh().
-  std::int32_t x{}, y{}, z{};                        ///< Position in bricks from the map's corner.
-  std::uint16_t known_count{};                       ///< Cells that are not unknown.
   bool dirty{};                                      ///< Written to in this scan.
   bool stale{};                                      ///< Cells changed since refresh().
+  std::uint16_t known_count{};                       ///< Cells that are not unknown.
+  std::int32_t x{}, y{}, z{};                        ///< Position in bricks from the map's corner.
 
   /// All cells become `value`: kUnknown or kFree.
-  void fill(std::int8_t value) noexcept;
-  /// Derives mip and known_count from cell. O(4096).
+  void fill(unsigned value) noexcept;
+  /// Derives mip and known_count from the cells. O(4096).
   void refresh() noexcept;
+  [[nodiscard]] unsigned cell(std::uint32_t morton) const noexcept {
+    return static_cast<unsigned>(word[morton / kCellsPerWord] >> (4U * (morton % kCellsPerWord))) & 0xFU;
+  }
+  void set_cell(std::uint32_t morton, unsigned value) noexcept;
   /// Flags of the cell of `level` (0 .. 4) with this Morton index. After refresh(). O(1).
   [[nodiscard]] std::uint8_t flags(int level, std::uint32_t morton) const noexcept;
   /// Free evidence for the blocks of `level` with Morton index 8 * parent + i, for each bit i of `blocks`.
   void add_free(int level, std::uint32_t parent, std::uint8_t blocks) noexcept;
   /// A surface in this cell of level 0.
-  void add_hit(std::uint32_t morton) noexcept;
-
- private:
-  [[nodiscard]] std::uint64_t load(std::size_t first) const noexcept;
-  /// Free evidence for those of eight cells whose bytes are set in `selected`.
-  void free_eight(std::size_t first, std::uint64_t selected) noexcept;
+  void add_hit(std::uint32_t morton) noexcept { set_cell(morton, evidence::after_hit(cell(morton))); }
 };
 
 /// Index of an entry in Brick::mip; level 1 .. 4.

@@ -45,7 +45,7 @@ Status BrickMap::Config::validate() const noexcept {
 
 std::size_t BrickMap::arena_bytes(const Config& config) noexcept {
   const std::size_t positions = position_count(config.bounds_W);
-  return positions * sizeof(std::int32_t) + positions / 8 * (sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
+  return positions * (2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
          config.max_bricks * (sizeof(Brick) + 2 * sizeof(std::uint32_t)) +
          config.max_frames * DepthPyramid::arena_bytes(config.max_image_side) +
          16 * alignof(std::max_align_t);
@@ -59,14 +59,16 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
       nz_(even_bricks(config.bounds_W.max_W.z() - corner_W_.z())) {
   const std::size_t positions = position_count(config.bounds_W);
   slot_ = arena.take<std::int32_t>(positions, "map positions");
-  order_ = arena.take<std::uint32_t>(positions / 8, "map order");
-  order_key_ = arena.take<std::uint16_t>(positions / 8, "map order keys");
+  order_ = arena.take<std::uint32_t>(positions, "map order");
+  order_key_ = arena.take<std::uint16_t>(positions, "map order keys");
   brick_ = arena.take<Brick>(config.max_bricks, "map bricks");
   brick_pool_ = &arena.last_pool();
   free_list_ = arena.take<std::uint32_t>(config.max_bricks, "map free list");
   dirty_ = arena.take<std::uint32_t>(config.max_bricks, "map dirty list");
   std::fill(slot_.begin(), slot_.end(), kUnknownBrick);
   free_brick_.fill(evidence::kFree);
+  surface_brick_.fill(evidence::kUnknown);
+  surface_brick_.mip.back() |= content::kOccupied;
   const auto cell_at = [this](const Vector3& p_W) {
     const Vector3 local = (p_W - corner_W_) / kFinestCell_m;
     return Cell{static_cast<std::int32_t>(local.x()), static_cast<std::int32_t>(local.y()),
@@ -88,6 +90,19 @@ std::size_t BrickMap::slot_of(std::int32_t bx, std::int32_t by, std::int32_t bz)
   return (static_cast<std::size_t>(bz) * static_cast<std::size_t>(ny_) + static_cast<std::size_t>(by)) *
              static_cast<std::size_t>(nx_) +
          static_cast<std::size_t>(bx);
+}
+
+const Brick* BrickMap::brick_at(std::size_t position) const noexcept {
+  switch (const std::int32_t slot = slot_[position]) {
+    case kUnknownBrick:
+      return nullptr;
+    case kFreeBrick:
+      return &free_brick_;
+    case kSurfaceBrick:
+      return &surface_brick_;
+    default:
+      return &brick_[static_cast<std::size_t>(slot)];
+  }
 }
 
 Vector3 BrickMap::brick_center_W(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
@@ -133,7 +148,7 @@ Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexce
 void BrickMap::free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept {
   std::int32_t& slot = slot_[slot_of(bx, by, bz)];
   if (slot == kFreeBrick) return;
-  if (slot == kUnknownBrick) {
+  if (slot < 0) {
     slot = kFreeBrick;
     known_cells_ += kCellsPerBrick;
     return;
@@ -209,15 +224,11 @@ std::size_t BrickMap::used_bytes() const noexcept {
 std::uint64_t BrickMap::digest() const noexcept {
   core::StateHash hash;
   for (std::size_t position = 0; position < slot_.size(); ++position) {
-    if (slot_[position] == kUnknownBrick) continue;
+    const Brick* brick = brick_at(position);
+    if (brick == nullptr) continue;
     hash.add(static_cast<std::uint64_t>(position));
-    const Brick& b =
-        slot_[position] == kFreeBrick ? free_brick_ : brick_[static_cast<std::size_t>(slot_[position])];
-    for (std::size_t i = 0; i < kCellsPerBrick; i += 8) {
-      std::uint64_t word = 0;
-      for (std::size_t k = 0; k < 8; ++k) word = (word << 8U) | static_cast<std::uint8_t>(b.cell[i + k]);
-      hash.add(word);
-    }
+    hash.add(std::uint64_t{brick->mip.back()});
+    for (const std::uint64_t word : brick->word) hash.add(word);
   }
   return hash.value();
 }

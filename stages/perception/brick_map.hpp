@@ -3,9 +3,11 @@
 ///
 /// Free space is found projectively, coarse to fine: a block all of whose pixels see past it is free at once,
 /// a block behind the surface is left alone, the rest is divided until cells of p0. Surfaces are the pixels'
-/// end points, always written at the finest level: that costs no more, and what a coarse block around them
-/// hides stays unknown, hence not free, until a finer look clears it. Free evidence is written first,
-/// surfaces after it, so that a look past a cell never erases a surface seen in the same scan.
+/// end points, written at the finest level whatever p0 is: what a coarse block around them hides stays
+/// unknown, hence not free, until a finer look clears it. Only where p0 is a brick (4.8 m) or more, and in
+/// bricks of which nothing is known, it is enough to note that there is a surface: unknown is not free
+/// either. Free evidence is written first, surfaces after it, so that a look past a cell never erases a
+/// surface seen in the same scan.
 #pragma once
 
 #include <array>
@@ -68,6 +70,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   };
   static constexpr std::int32_t kUnknownBrick = -1;
   static constexpr std::int32_t kFreeBrick = -2;
+  /// Nothing known but that a look at p0 >= 4.8 m met a surface there: occupied as a brick, unknown below.
+  static constexpr std::int32_t kSurfaceBrick = -3;
   struct Node {
     int level;
     std::uint32_t x, y, z;  ///< In cells of `level` from the brick's corner.
@@ -85,22 +89,50 @@ class BrickMap final : public OccupancyMap, private MapView {
 
   [[nodiscard]] std::size_t usable_frames(const IntegrationRequest& request,
                                           IntegrationResult& result) noexcept;
-  /// A block of 2^3 bricks: one cell of the coarsest level, and the unit in which v0 is spent.
-  struct Block {
+  /// A unit is what v0 is spent in: a brick, or a block of 2^3 bricks (one cell of the coarsest level) if p0
+  /// is that coarse or v0 is enough for everything in reach.
+  struct Position {
     std::int32_t x, y, z;
   };
-  [[nodiscard]] std::size_t order_blocks(const IntegrationRequest& request) noexcept;
-  [[nodiscard]] std::size_t block_index(const Block& block) const noexcept;
-  [[nodiscard]] Block block_at(std::uint32_t index) const noexcept;
-  [[nodiscard]] Vector3 block_center_W(const Block& block) const noexcept;
-  /// Writes free space, block after block, until budget or v0 is spent. Returns the blocks that were done.
-  [[nodiscard]] std::size_t clear_blocks(std::size_t count, const IntegrationRequest& request,
-                                         core::StageBudget& budget, core::Work& work) noexcept;
+  [[nodiscard]] std::size_t order_units(const IntegrationRequest& request) noexcept;
+  [[nodiscard]] std::size_t unit_index(const Position& unit) const noexcept;
+  [[nodiscard]] Position unit_at(std::uint32_t index) const noexcept;
+  [[nodiscard]] Vector3 unit_center_W(const Position& unit) const noexcept;
+  /// What of a cube lies within the bounds: no more than that is charged to v0.
+  [[nodiscard]] double volume_m3(const Vector3& center_W, double edge_m) const noexcept;
+  /// Writes free space, unit after unit, until budget or v0 is spent. Returns the units that were done.
+  [[nodiscard]] std::size_t clear_units(std::size_t count, const IntegrationRequest& request,
+                                        core::StageBudget& budget, core::Work& work) noexcept;
   /// False when the budget was spent on the way.
-  [[nodiscard]] bool clear_bricks(const Block& block, std::uint8_t cameras, int finest,
-                                  core::StageBudget& budget, core::Work& work) noexcept;
+  [[nodiscard]] bool clear_unit(const Position& unit, std::uint8_t cameras, int finest,
+                                core::StageBudget& budget, core::Work& work) noexcept;
+  [[nodiscard]] bool clear_block(const Position& block, std::uint8_t cameras, int finest,
+                                 core::StageBudget& budget, core::Work& work) noexcept;
+  void clear_brick(const Position& at, std::uint8_t cameras, int finest, core::Work& work) noexcept;
+  void free_unit(const Position& unit) noexcept;
   void free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
-  void add_surfaces(const IntegrationRequest& request, double reach_m, core::Work& work) noexcept;
+  /// A camera whose surfaces are being written.
+  struct SurfaceCamera {
+    const PosedDepthFrame* posed{};
+    double pitch{};  ///< Of the pixels, at depth 1.
+    bool coarse{};   ///< p0 is a brick or more: surfaces in unknown bricks are noted, not written.
+    PixelLine line{};
+  };
+  /// Of column u and row v of the image, in edges, for a depth of 1.
+  [[nodiscard]] static std::array<float, 3> direction(const SurfaceCamera& camera, double u, double v,
+                                                      double edge_m) noexcept;
+  void add_surfaces(const IntegrationRequest& request, core::Work& work) noexcept;
+  /// The pixels [u0, u1) of row v.
+  void add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
+                  core::Work& work) noexcept;
+  /// Tile by tile: pixels are looked at where they may end in a brick of which something is known.
+  void add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, core::Work& work) noexcept;
+  /// True if nothing is known of all bricks in which this tile of tiles_ may end: then that is all to be
+  /// done.
+  [[nodiscard]] bool note_surface(std::size_t tile) noexcept;
+  [[nodiscard]] Brick* surface_brick(std::int32_t bx, std::int32_t by, std::int32_t bz, bool coarse) noexcept;
+  /// Whether v0 reached this brick in this scan.
+  [[nodiscard]] bool paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
   void free_vehicle() noexcept;
   [[nodiscard]] bool cell_of(const Vector3& p_W, Cell& cell) const noexcept;
   [[nodiscard]] std::size_t slot_of(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
@@ -109,6 +141,8 @@ class BrickMap final : public OccupancyMap, private MapView {
                               std::uint64_t& lookups) const noexcept;
   [[nodiscard]] const Brick* brick_within(std::int32_t bx, std::int32_t by, std::int32_t bz,
                                           double radius_m) const noexcept;
+  /// nullptr where nothing is known.
+  [[nodiscard]] const Brick* brick_at(std::size_t position) const noexcept;
   [[nodiscard]] Brick* touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
   [[nodiscard]] bool give_up_farthest() noexcept;
   [[nodiscard]] bool brick_range_free(const Brick& brick, const Cell& low, const Cell& high, int finest,
@@ -126,14 +160,18 @@ class BrickMap final : public OccupancyMap, private MapView {
   core::PoolRecord* brick_pool_{nullptr};
   std::span<std::uint32_t> free_list_;
   std::span<std::uint32_t> dirty_;
-  std::span<std::uint32_t> order_;      ///< Blocks near the cameras, nearest to the trajectory first.
-  std::span<std::uint16_t> order_key_;  ///< Of each block of the map.
+  std::span<std::uint32_t> order_;      ///< Units near the cameras, nearest to the trajectory first.
+  std::span<std::uint16_t> order_key_;  ///< Of each unit of the map.
+  int unit_level_{kBrickLevel};
   std::size_t free_count_{0};
   std::size_t dirty_count_{0};
   SightCameras cameras_{};
   BrickSeen seen_{};
   SurfaceRow row_{};
-  Brick free_brick_{};  ///< What every position with kFreeBrick reads as.
+  TileRow tiles_{};
+  double reach_m_{0.0};    ///< From the trajectory: v0 was spent up to here.
+  Brick free_brick_{};     ///< What every position with kFreeBrick reads as.
+  Brick surface_brick_{};  ///< The same for kSurfaceBrick.
   std::array<std::size_t, kMaxCameras> frame_of_{};
   std::array<std::optional<DepthPyramid>, kMaxCameras> pyramid_{};
   std::uint64_t known_cells_{0};

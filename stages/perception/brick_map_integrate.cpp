@@ -8,15 +8,18 @@ namespace {
 
 constexpr double kOrderStep_m = 0.5;  // blocks whose distances differ by less keep their order in space
 constexpr int kBlockLevel = kBrickLevel + 1;
-constexpr double kBlock_m = cell_size_m(kBlockLevel);
-
-constexpr double volume_m3(int level) noexcept {
-  const double edge_m = cell_size_m(level);
-  return edge_m * edge_m * edge_m;
-}
 
 std::uint32_t in_brick(std::int32_t cell) noexcept {
   return static_cast<std::uint32_t>(cell & (kBrickCells - 1));
+}
+
+/// Tiles of at most half the image that a cell of p0 has at the end of the range.
+int tile_shift(const firmware_if::DepthFrame& frame, int level) noexcept {
+  const double cell_pixels = 0.5 * frame.width * cell_size_m(std::clamp(level, 0, kPrecisionLevels - 1)) /
+                             static_cast<double>(frame.tan_half_fov_ratio * frame.range_m);
+  int shift = 0;
+  while (shift < 3 && cell_pixels >= 4.0 * (1 << shift)) ++shift;
+  return shift;
 }
 
 }  // namespace
@@ -26,7 +29,7 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
   for (std::size_t i = 0; i < request.frames.size(); ++i) {
     const PosedDepthFrame& posed = request.frames[i];
     if (cameras_.count == config_.max_frames || check_frame(posed) != Status::kOk ||
-        pyramid_[cameras_.count]->build(posed.frame) != Status::kOk) {
+        pyramid_[cameras_.count]->build(posed.frame, tile_shift(posed.frame, request.level)) != Status::kOk) {
       ++result.frames_refused;
       continue;
     }
@@ -39,25 +42,34 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
   return cameras_.count;
 }
 
-std::size_t BrickMap::block_index(const Block& block) const noexcept {
-  return (static_cast<std::size_t>(block.z) * static_cast<std::size_t>(ny_ / 2) +
-          static_cast<std::size_t>(block.y)) *
-             static_cast<std::size_t>(nx_ / 2) +
-         static_cast<std::size_t>(block.x);
+std::size_t BrickMap::unit_index(const Position& unit) const noexcept {
+  const int shift = unit_level_ - kBrickLevel;
+  return (static_cast<std::size_t>(unit.z) * static_cast<std::size_t>(ny_ >> shift) +
+          static_cast<std::size_t>(unit.y)) *
+             static_cast<std::size_t>(nx_ >> shift) +
+         static_cast<std::size_t>(unit.x);
 }
 
-BrickMap::Block BrickMap::block_at(std::uint32_t index) const noexcept {
-  const auto nx = static_cast<std::uint32_t>(nx_ / 2);
-  const auto ny = static_cast<std::uint32_t>(ny_ / 2);
+BrickMap::Position BrickMap::unit_at(std::uint32_t index) const noexcept {
+  const int shift = unit_level_ - kBrickLevel;
+  const auto nx = static_cast<std::uint32_t>(nx_ >> shift);
+  const auto ny = static_cast<std::uint32_t>(ny_ >> shift);
   return {static_cast<std::int32_t>(index % nx), static_cast<std::int32_t>((index / nx) % ny),
           static_cast<std::int32_t>(index / nx / ny)};
 }
 
-Vector3 BrickMap::block_center_W(const Block& block) const noexcept {
-  return corner_W_ + kBlock_m * Vector3(block.x + 0.5, block.y + 0.5, block.z + 0.5);
+Vector3 BrickMap::unit_center_W(const Position& unit) const noexcept {
+  return corner_W_ + cell_size_m(unit_level_) * Vector3(unit.x + 0.5, unit.y + 0.5, unit.z + 0.5);
 }
 
-std::size_t BrickMap::order_blocks(const IntegrationRequest& request) noexcept {
+double BrickMap::volume_m3(const Vector3& center_W, double edge_m) const noexcept {
+  const Vector3 half = Vector3::Constant(0.5 * edge_m);
+  const Vector3 low = (center_W - half).cwiseMax(config_.bounds_W.min_W);
+  const Vector3 high = (center_W + half).cwiseMin(config_.bounds_W.max_W);
+  return (high - low).cwiseMax(0.0).prod();
+}
+
+std::size_t BrickMap::order_units(const IntegrationRequest& request) noexcept {
   // Everything that a camera can see, as a box around all of them; a cubic frustum of range r reaches
   // sqrt(3) r.
   Vector3 low = cameras_.camera[0].p_WC;
@@ -72,13 +84,17 @@ std::size_t BrickMap::order_blocks(const IntegrationRequest& request) noexcept {
   const Aabb& bounds = config_.bounds_W;
   low = low.cwiseMax(bounds.min_W).cwiseMin(bounds.max_W);
   high = high.cwiseMin(bounds.max_W).cwiseMax(bounds.min_W);
-  const auto index = [](double p_m, double corner_m, std::int32_t bricks) {
-    return std::clamp(static_cast<std::int32_t>((p_m - corner_m) / kBlock_m), 0, bricks / 2 - 1);
+  // Where v0 cannot run out, larger steps give the same map sooner.
+  const bool all = request.volume_m3 >= (high - low).prod();
+  unit_level_ = all || request.level >= kBlockLevel ? kBlockLevel : kBrickLevel;
+  const auto index = [this](double p_m, double corner_m, std::int32_t bricks) {
+    return std::clamp(static_cast<std::int32_t>((p_m - corner_m) / cell_size_m(unit_level_)), 0,
+                      (bricks >> (unit_level_ - kBrickLevel)) - 1);
   };
-  const Block first{index(low.x(), corner_W_.x(), nx_), index(low.y(), corner_W_.y(), ny_),
-                    index(low.z(), corner_W_.z(), nz_)};
-  const Block last{index(high.x(), corner_W_.x(), nx_), index(high.y(), corner_W_.y(), ny_),
-                   index(high.z(), corner_W_.z(), nz_)};
+  const Position first{index(low.x(), corner_W_.x(), nx_), index(low.y(), corner_W_.y(), ny_),
+                       index(low.z(), corner_W_.z(), nz_)};
+  const Position last{index(high.x(), corner_W_.x(), nx_), index(high.y(), corner_W_.y(), ny_),
+                      index(high.z(), corner_W_.z(), nz_)};
 
   // Counting sort by distance to the trajectory: bounded, stable, no comparison of doubles.
   constexpr std::size_t kBuckets = 256;
@@ -90,14 +106,14 @@ std::size_t BrickMap::order_blocks(const IntegrationRequest& request) noexcept {
     return static_cast<std::uint16_t>(
         std::min(std::sqrt(nearest2) / kOrderStep_m, static_cast<double>(kBuckets - 1)));
   };
-  const auto for_each_block = [&first, &last](auto&& on_block) {
+  const auto for_each_unit = [&first, &last](auto&& on_unit) {
     for (std::int32_t z = first.z; z <= last.z; ++z)
       for (std::int32_t y = first.y; y <= last.y; ++y)
-        for (std::int32_t x = first.x; x <= last.x; ++x) on_block(Block{x, y, z});
+        for (std::int32_t x = first.x; x <= last.x; ++x) on_unit(Position{x, y, z});
   };
-  for_each_block([&](const Block& block) {
-    const std::uint16_t key = key_of(block_center_W(block));
-    order_key_[block_index(block)] = key;
+  for_each_unit([&](const Position& unit) {
+    const std::uint16_t key = key_of(unit_center_W(unit));
+    order_key_[unit_index(unit)] = key;
     ++start[key];
   });
   std::uint32_t total = 0;
@@ -106,62 +122,68 @@ std::size_t BrickMap::order_blocks(const IntegrationRequest& request) noexcept {
     s = total;
     total += count;
   }
-  for_each_block([&](const Block& block) {
-    const std::size_t at = block_index(block);
+  for_each_unit([&](const Position& unit) {
+    const std::size_t at = unit_index(unit);
     order_[start[order_key_[at]]++] = static_cast<std::uint32_t>(at);
   });
   return total;
 }
 
-bool BrickMap::clear_bricks(const Block& block, std::uint8_t cameras, int finest, core::StageBudget& budget,
-                            core::Work& work) noexcept {
-  const EightSeen eight = see_children(cameras_, {block_center_W(block), kBlockLevel, cameras});
+void BrickMap::clear_brick(const Position& at, std::uint8_t cameras, int finest, core::Work& work) noexcept {
+  const Vector3 center_W = brick_center_W(at.x, at.y, at.z);
+  see_brick(cameras_, {center_W, kBrickLevel, cameras}, finest, seen_);
+  work.units += seen_.visited;
+  work.volume_m3 += seen_.free_cells * volume_m3(center_W, kBrick_m) / kCellsPerBrick;
+  if (seen_.count == 0 || slot_[slot_of(at.x, at.y, at.z)] == kFreeBrick) return;
+  Brick* const brick = touch(at.x, at.y, at.z);
+  if (brick == nullptr) return;  // pool full, and nothing farther away to give up
+  for (std::size_t i = 0; i < seen_.count; ++i)
+    brick->add_free(seen_.group[i].level, seen_.group[i].parent, seen_.group[i].free);
+  refresh(*brick);  // while it is in the cache
+}
+
+bool BrickMap::clear_block(const Position& block, std::uint8_t cameras, int finest, core::StageBudget& budget,
+                           core::Work& work) noexcept {
+  const EightSeen eight = see_children(cameras_, {unit_center_W(block), kBlockLevel, cameras});
   ++work.units;
   for (std::int32_t child = 0; child < 8; ++child) {
-    const std::int32_t bx = 2 * block.x + (child & 1), by = 2 * block.y + ((child >> 1) & 1),
-                       bz = 2 * block.z + (child >> 2);
+    const Position at{2 * block.x + (child & 1), 2 * block.y + ((child >> 1) & 1),
+                      2 * block.z + (child >> 2)};
     if (((eight.free >> child) & 1) != 0) {
-      free_brick(bx, by, bz);
-      work.volume_m3 += volume_m3(kBrickLevel);
+      free_brick(at.x, at.y, at.z);
+      work.volume_m3 += volume_m3(brick_center_W(at.x, at.y, at.z), kBrick_m);
     } else if (((eight.mixed >> child) & 1) != 0 && finest < kBrickLevel) {
-      see_brick(cameras_,
-                {brick_center_W(bx, by, bz), kBrickLevel, eight.cameras[static_cast<std::size_t>(child)]},
-                finest, seen_);
-      work.units += seen_.visited;
-      work.volume_m3 += seen_.free_cells * volume_m3(0);
-      Brick* brick = nullptr;
-      const bool was_free = slot_[slot_of(bx, by, bz)] == kFreeBrick;
-      for (std::size_t i = 0; i < seen_.count && !was_free; ++i) {
-        const FreeGroup& group = seen_.group[i];
-        if (brick == nullptr) brick = touch(bx, by, bz);
-        if (brick == nullptr) break;  // pool full, and nothing farther away to give up
-        brick->add_free(group.level, group.parent, group.free);
-      }
-      if (brick != nullptr) refresh(*brick);  // while it is in the cache
+      clear_brick(at, eight.cameras[static_cast<std::size_t>(child)], finest, work);
       if (budget.spent(work)) return false;
     }
   }
   return true;
 }
 
-std::size_t BrickMap::clear_blocks(std::size_t count, const IntegrationRequest& request,
-                                   core::StageBudget& budget, core::Work& work) noexcept {
+bool BrickMap::clear_unit(const Position& unit, std::uint8_t cameras, int finest, core::StageBudget& budget,
+                          core::Work& work) noexcept {
+  if (unit_level_ == kBlockLevel) return clear_block(unit, cameras, finest, budget, work);
+  clear_brick(unit, cameras, finest, work);
+  return !budget.spent(work);
+}
+
+std::size_t BrickMap::clear_units(std::size_t count, const IntegrationRequest& request,
+                                  core::StageBudget& budget, core::Work& work) noexcept {
+  const int finest = std::max(request.level, 0);
   std::array<Vector3, 8> center_W;
   for (std::size_t first = 0; first < count; first += 8) {
     const std::size_t here = std::min<std::size_t>(8, count - first);
     for (std::size_t i = 0; i < 8; ++i)
-      center_W[i] = block_center_W(block_at(order_[first + std::min(i, here - 1)]));
-    const EightSeen eight = see_blocks(cameras_, kBlockLevel, center_W);
+      center_W[i] = unit_center_W(unit_at(order_[first + std::min(i, here - 1)]));
+    const EightSeen eight = see_blocks(cameras_, unit_level_, center_W);
     ++work.units;
     for (std::size_t i = 0; i < here; ++i) {
-      const Block block = block_at(order_[first + i]);
+      const Position unit = unit_at(order_[first + i]);
       if (((eight.free >> i) & 1U) != 0) {
-        for (std::int32_t child = 0; child < 8; ++child)
-          free_brick(2 * block.x + (child & 1), 2 * block.y + ((child >> 1) & 1), 2 * block.z + (child >> 2));
-        work.volume_m3 += volume_m3(kBlockLevel);
-      } else if (((eight.mixed >> i) & 1U) != 0 && request.level < kBlockLevel) {
-        if (!clear_bricks(block, eight.cameras[i], std::max(request.level, 0), budget, work))
-          return first + i;
+        free_unit(unit);
+        work.volume_m3 += volume_m3(center_W[i], cell_size_m(unit_level_));
+      } else if (((eight.mixed >> i) & 1U) != 0 && finest < unit_level_) {
+        if (!clear_unit(unit, eight.cameras[i], finest, budget, work)) return first + i;
       }
       if (work.volume_m3 >= request.volume_m3) return first + i + 1;
     }
@@ -170,44 +192,135 @@ std::size_t BrickMap::clear_blocks(std::size_t count, const IntegrationRequest& 
   return count;
 }
 
-void BrickMap::add_surfaces(const IntegrationRequest& request, double reach_m, core::Work& work) noexcept {
+void BrickMap::free_unit(const Position& unit) noexcept {
+  if (unit_level_ == kBrickLevel) return free_brick(unit.x, unit.y, unit.z);
+  for (std::int32_t child = 0; child < 8; ++child)
+    free_brick(2 * unit.x + (child & 1), 2 * unit.y + ((child >> 1) & 1), 2 * unit.z + (child >> 2));
+}
+
+std::array<float, 3> BrickMap::direction(const SurfaceCamera& camera, double u, double v,
+                                         double edge_m) noexcept {
+  const Matrix3& R = camera.posed->X_WC.R_RT;
+  const double y = camera.pitch * (0.5 * camera.posed->frame.width - u);
+  const double z = camera.pitch * (0.5 * camera.posed->frame.height - v);
+  std::array<float, 3> result{};
+  for (int axis = 0; axis < 3; ++axis)
+    result[static_cast<std::size_t>(axis)] =
+        static_cast<float>((R(axis, 0) + R(axis, 1) * y + R(axis, 2) * z) / edge_m);
+  return result;
+}
+
+bool BrickMap::paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
+  const int up = unit_level_ - kBrickLevel;
+  return order_key_[unit_index({bx >> up, by >> up, bz >> up})] * kOrderStep_m <= reach_m_;
+}
+
+void BrickMap::add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
+                          core::Work& work) noexcept {
+  const firmware_if::DepthFrame& frame = camera.posed->frame;
+  PixelLine line = camera.line;
+  line.first = direction(camera, static_cast<double>(u0) + 0.5, static_cast<double>(v) + 0.5, kFinestCell_m);
+  end_cells(line, frame.depth_m.subspan(v * frame.width + u0, u1 - u0), frame.range_m, row_);
   std::size_t last_position = slot_.size();
   Brick* brick = nullptr;
+  for (std::size_t n = 0; n < row_.count; ++n) {
+    const Cell cell{row_.cell[0][n], row_.cell[1][n], row_.cell[2][n]};
+    const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
+    const std::size_t position = slot_of(bx, by, bz);
+    if (position != last_position) {
+      last_position = position;
+      // Beyond the space that v0 paid for nothing is written: neither free nor occupied.
+      brick = paid(bx, by, bz) ? surface_brick(bx, by, bz, camera.coarse) : nullptr;
+    }
+    if (brick == nullptr) continue;
+    brick->add_hit(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)));
+    ++work.units;
+  }
+}
+
+Brick* BrickMap::surface_brick(std::int32_t bx, std::int32_t by, std::int32_t bz, bool coarse) noexcept {
+  std::int32_t& slot = slot_[slot_of(bx, by, bz)];
+  if (!coarse || slot >= 0 || slot == kFreeBrick) return touch(bx, by, bz);
+  slot = kSurfaceBrick;
+  return nullptr;
+}
+
+bool BrickMap::note_surface(std::size_t tile) noexcept {
+  if (!tiles_.surface[tile]) return true;
+  const auto low = [&](std::size_t axis) { return std::max(tiles_.low[axis][tile], 0); };
+  const auto high = [&](std::size_t axis, std::int32_t n) {
+    return std::min(tiles_.high[axis][tile], n - 1);
+  };
+  for (std::int32_t bz = low(2); bz <= high(2, nz_); ++bz) {
+    for (std::int32_t by = low(1); by <= high(1, ny_); ++by) {
+      for (std::int32_t bx = low(0); bx <= high(0, nx_); ++bx) {
+        const std::int32_t slot = slot_[slot_of(bx, by, bz)];
+        if (slot != kUnknownBrick && slot != kSurfaceBrick) return false;
+      }
+    }
+  }
+  const Position at{tiles_.brick[0][tile], tiles_.brick[1][tile], tiles_.brick[2][tile]};
+  const bool inside = at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x < nx_ && at.y < ny_ && at.z < nz_;
+  if (inside && paid(at.x, at.y, at.z)) slot_[slot_of(at.x, at.y, at.z)] = kSurfaceBrick;
+  return true;
+}
+
+void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, core::Work& work) noexcept {
+  const firmware_if::DepthFrame& frame = camera.posed->frame;
+  const Matrix3& R = camera.posed->X_WC.R_RT;
+  const DepthPyramid::Level& tiles = image.tiles();
+  const std::size_t side = std::size_t{1} << static_cast<unsigned>(tiles.shift);
+  const auto columns = static_cast<std::size_t>(tiles.width);
+  const double tile_pitch = camera.pitch * static_cast<double>(side);
+  const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kBrick_m;
+  TileLine line;
+  line.steps_per_m = image.steps_per_m();
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto k = static_cast<std::size_t>(axis);
+    line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
+    line.rest[k] = static_cast<float>(origin[axis] - line.origin[k]);
+    line.step[k] = static_cast<float>(-tile_pitch * R(axis, 1) / kBrick_m);
+    line.half[k] =
+        static_cast<float>(0.5 * tile_pitch * (std::fabs(R(axis, 1)) + std::fabs(R(axis, 2))) / kBrick_m);
+  }
+  const DepthPyramid::Entry* entry = tiles.entry;
+  for (std::size_t v = 0; v < frame.height; v += side, entry += columns) {
+    const double half = 0.5 * static_cast<double>(side);
+    line.first = direction(camera, half, static_cast<double>(v) + half, kBrick_m);
+    tile_boxes(line, entry, columns, tiles_);
+    work.units += columns;
+    for (std::size_t x = 0; x < columns; ++x) {
+      if (note_surface(x)) continue;
+      std::size_t end = x + 1;
+      while (end < columns && !note_surface(end)) ++end;
+      for (std::size_t row = v; row < std::min<std::size_t>(v + side, frame.height); ++row)
+        add_pixels(camera, row, x * side, std::min<std::size_t>(end * side, frame.width), work);
+      x = end;
+    }
+  }
+}
+
+void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work) noexcept {
   for (std::size_t i = 0; i < cameras_.count; ++i) {
-    const PosedDepthFrame& posed = request.frames[frame_of_[i]];
-    const firmware_if::DepthFrame& frame = posed.frame;
-    const double pitch = 2.0 * static_cast<double>(frame.tan_half_fov_ratio);
-    const Vector3 origin = (posed.X_WC.p_RT - corner_W_) / kFinestCell_m;
-    PixelLine line;
-    line.low = {low_.x, low_.y, low_.z};
-    line.high = {high_.x, high_.y, high_.z};
+    SurfaceCamera camera;
+    camera.posed = &request.frames[frame_of_[i]];
+    camera.coarse = request.level >= kBrickLevel;
+    const firmware_if::DepthFrame& frame = camera.posed->frame;
+    camera.pitch = 2.0 * static_cast<double>(frame.tan_half_fov_ratio) / frame.width;
+    const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kFinestCell_m;
+    camera.line.low = {low_.x, low_.y, low_.z};
+    camera.line.high = {high_.x, high_.y, high_.z};
     for (int axis = 0; axis < 3; ++axis) {
       const auto k = static_cast<std::size_t>(axis);
-      line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
-      line.rest[k] = static_cast<float>(origin[axis] - line.origin[k]);
-      line.step[k] = static_cast<float>(-pitch / frame.width / kFinestCell_m * posed.X_WC.R_RT(axis, 1));
+      camera.line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
+      camera.line.rest[k] = static_cast<float>(origin[axis] - camera.line.origin[k]);
+      camera.line.step[k] =
+          static_cast<float>(-camera.pitch / kFinestCell_m * camera.posed->X_WC.R_RT(axis, 1));
     }
-    for (int v = 0; v < frame.height; ++v) {
-      const Vector3 ray_C(1.0, pitch * (0.5 - 0.5 / frame.width), pitch * (0.5 - (v + 0.5) / frame.height));
-      const Vector3 first = posed.X_WC.R_RT * ray_C / kFinestCell_m;
-      for (int axis = 0; axis < 3; ++axis)
-        line.first[static_cast<std::size_t>(axis)] = static_cast<float>(first[axis]);
-      const std::size_t width = frame.width;
-      end_cells(line, frame.depth_m.subspan(static_cast<std::size_t>(v) * width, width), frame.range_m, row_);
-      for (std::size_t n = 0; n < row_.count; ++n) {
-        const Cell cell{row_.cell[0][n], row_.cell[1][n], row_.cell[2][n]};
-        const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
-        const std::size_t position = slot_of(bx, by, bz);
-        if (position != last_position) {
-          last_position = position;
-          // Beyond the space that v0 paid for nothing is written: neither free nor occupied.
-          const bool paid = order_key_[block_index({bx / 2, by / 2, bz / 2})] * kOrderStep_m <= reach_m;
-          brick = paid ? touch(bx, by, bz) : nullptr;
-        }
-        if (brick == nullptr) continue;
-        brick->add_hit(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)));
-        ++work.units;
-      }
+    if (camera.coarse) {
+      add_tiles(camera, *pyramid_[i], work);
+    } else {
+      for (std::size_t v = 0; v < frame.height; ++v) add_pixels(camera, v, 0, frame.width, work);
     }
   }
 }
@@ -239,12 +352,12 @@ Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget&
   if (usable_frames(request, result) == 0 || request.trajectory_W.empty()) return Status::kInvalidArgument;
   ++counters_.scans;
   vehicle_W_ = cameras_.camera[0].p_WC;
-  const std::size_t count = order_blocks(request);
-  const std::size_t done = clear_blocks(count, request, budget, result.work);
-  const double reach_m =
+  const std::size_t count = order_units(request);
+  const std::size_t done = clear_units(count, request, budget, result.work);
+  reach_m_ =
       done < count && done > 0 ? order_key_[order_[done - 1]] * kOrderStep_m : (done < count ? 0.0 : 1e18);
   free_vehicle();
-  add_surfaces(request, reach_m, result.work);
+  add_surfaces(request, result.work);
   refresh_dirty();
   return done < count ? Status::kBudgetSpent : Status::kOk;
 }

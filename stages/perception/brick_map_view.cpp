@@ -22,11 +22,10 @@ Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& bu
   for (std::int32_t bz = 0; bz < nz_; ++bz) {
     for (std::int32_t by = 0; by < ny_; ++by) {
       for (std::int32_t bx = 0; bx < nx_; ++bx, ++position) {
-        const std::int32_t slot = slot_[position];
-        if (slot == kUnknownBrick) continue;
+        const Brick* brick = brick_at(position);
+        if (brick == nullptr || brick->known_count == 0) continue;
         const double distance_m = (brick_center_W(bx, by, bz) - view_center_W_).norm();
-        known[std::min(static_cast<std::size_t>(distance_m / kBucket_m), kBuckets - 1)] +=
-            slot == kFreeBrick ? kCellsPerBrick : brick_[static_cast<std::size_t>(slot)].known_count;
+        known[std::min(static_cast<std::size_t>(distance_m / kBucket_m), kBuckets - 1)] += brick->known_count;
         if (++work.units % 1024 == 0 && budget.spent(work)) {
           // Too late to know what fits: only the nearest space is safe to promise.
           view_radius_m_ = kBrick_m;
@@ -52,11 +51,11 @@ Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& bu
 const Brick* BrickMap::brick_within(std::int32_t bx, std::int32_t by, std::int32_t bz,
                                     double radius_m) const noexcept {
   if (bx < 0 || by < 0 || bz < 0 || bx >= nx_ || by >= ny_ || bz >= nz_) return nullptr;
-  const std::int32_t slot = slot_[slot_of(bx, by, bz)];
-  if (slot == kUnknownBrick) return nullptr;
+  const Brick* brick = brick_at(slot_of(bx, by, bz));
+  if (brick == nullptr) return nullptr;
   const double distance2 = (brick_center_W(bx, by, bz) - view_center_W_).squaredNorm();
   if (distance2 >= radius_m * radius_m) return nullptr;
-  return slot == kFreeBrick ? &free_brick_ : &brick_[static_cast<std::size_t>(slot)];
+  return brick;
 }
 
 bool BrickMap::brick_range_free(const Brick& brick, const Cell& low, const Cell& high, int finest,

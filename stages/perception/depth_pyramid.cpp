@@ -70,28 +70,37 @@ DepthPyramid::DepthPyramid(core::Arena& arena, std::size_t max_side) noexcept : 
   memory_ = arena.take<Entry>(entry_count(max_side), "map depth pyramid");
 }
 
-void DepthPyramid::fill_pixels(const firmware_if::DepthFrame& frame, Entry* pixel) noexcept {
-  if (depth_steps(frame.depth_m, frame.range_m, steps_per_m_, pixel) == 0) return;
-  for (std::size_t y = 0; y < frame.height; ++y) {
-    for (std::size_t x = 0; x < frame.width; ++x) {
-      const std::size_t i = y * frame.width + x;
-      if (!(frame.depth_m[i] > 0.0F))
-        pixel[i] = entry_of(bridged_m(frame, x, y), frame.range_m, steps_per_m_);
+void DepthPyramid::fill_tiles(const firmware_if::DepthFrame& frame, unsigned shift, Entry* tile) noexcept {
+  const std::size_t side = std::size_t{1} << shift;
+  const std::size_t columns = (frame.width + side - 1) >> shift;
+  for (std::size_t y = 0; y < frame.height; y += side, tile += columns) {
+    const std::size_t rows = std::min(side, frame.height - y);
+    const DepthStrip strip{frame.depth_m.data() + y * frame.width, frame.width, rows, frame.range_m,
+                           steps_per_m_};
+    if (tile_steps(strip, static_cast<int>(shift), tile)) continue;
+    for (std::size_t v = y; v < y + rows; ++v) {
+      for (std::size_t u = 0; u < frame.width; ++u) {
+        if (frame.depth_m[v * frame.width + u] > 0.0F) continue;
+        Entry& entry = tile[u >> shift];
+        entry = min_of(entry, entry_of(bridged_m(frame, u, v), frame.range_m, steps_per_m_));
+      }
     }
   }
 }
 
-Status DepthPyramid::build(const firmware_if::DepthFrame& frame) noexcept {
+Status DepthPyramid::build(const firmware_if::DepthFrame& frame, int tile_shift) noexcept {
   if (frame.width > max_side_ || frame.height > max_side_ || memory_.empty()) return Status::kCapacity;
   steps_per_m_ = static_cast<float>(kMaxSteps - 1) / frame.range_m;
-  std::size_t width = frame.width;
-  std::size_t height = frame.height;
+  const auto shift = static_cast<unsigned>(std::clamp(tile_shift, 0, 3));
+  std::size_t width = (frame.width + (std::size_t{1} << shift) - 1) >> shift;
+  std::size_t height = (frame.height + (std::size_t{1} << shift) - 1) >> shift;
   Entry* fine = memory_.data();
-  fill_pixels(frame, fine);
-  level_[0] = {fine, static_cast<std::int32_t>(width), 0, 1};
-  for (int k = 1; k < kMaxLevels; ++k) {
+  fill_tiles(frame, shift, fine);
+  level_[0] = {fine, static_cast<std::int32_t>(width), static_cast<int>(shift), 1};
+  const int first = static_cast<int>(shift) + 1;
+  for (int k = first; k < kMaxLevels; ++k) {
     // From windows of half the side: this one and the one after it, in both directions.
-    const std::size_t stride = k == 1 ? 1 : 2;
+    const std::size_t stride = k == first ? 1 : 2;
     const std::size_t to_width = (width + stride - 1) / stride;
     const std::size_t to_height = (height + stride - 1) / stride;
     Entry* coarse = fine + width * height;
@@ -115,7 +124,7 @@ Status DepthPyramid::build(const firmware_if::DepthFrame& frame) noexcept {
 }
 
 DepthPyramid::Bound DepthPyramid::bound(int u0, int v0, int u1, int v1) const noexcept {
-  const Level& l = level(level_for(std::max(u1 - u0, v1 - v0) + 1));
+  const Level& l = level(std::max(level_for(std::max(u1 - u0, v1 - v0) + 1), first_level()));
   const auto first = [&l](int from) { return from >> l.shift; };
   const auto last = [&l, first](int from, int to) {
     return std::max(((to + (1 << l.shift)) >> l.shift) - l.back, first(from));

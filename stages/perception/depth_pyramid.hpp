@@ -60,20 +60,25 @@ class DepthPyramid {
   [[nodiscard]] static std::size_t arena_bytes(std::size_t max_side) noexcept;
   /// Room for images of up to max_side x max_side pixels.
   DepthPyramid(core::Arena& arena, std::size_t max_side) noexcept;
-  /// kCapacity if the image is larger than planned. O(pixels).
-  [[nodiscard]] Status build(const firmware_if::DepthFrame& frame) noexcept;
+  /// kCapacity if the image is larger than planned. `tile_shift` in [0, 3]: the finest bounds are those of
+  /// tiles of 2^tile_shift pixels a side, for eyes that need no better. O(pixels).
+  [[nodiscard]] Status build(const firmware_if::DepthFrame& frame, int tile_shift = 0) noexcept;
   /// The level for rectangles of up to this many pixels a side: the least k with side <= 2^k + 2. O(1).
   [[nodiscard]] static constexpr int level_for(std::int32_t side) noexcept {
     if (side <= 4) return side <= 2 ? 0 : 1;
     return 32 - __builtin_clz(static_cast<unsigned>(side - 3));
   }
   [[nodiscard]] const Level& level(int k) const noexcept { return level_[static_cast<std::size_t>(k)]; }
+  /// The finest level that there is: 0, or tile_shift + 1.
+  [[nodiscard]] int first_level() const noexcept { return level_[0].shift == 0 ? 0 : level_[0].shift + 1; }
+  /// The tiles, side by side; pixels if tile_shift was 0.
+  [[nodiscard]] const Level& tiles() const noexcept { return level_[0]; }
   [[nodiscard]] float steps_per_m() const noexcept { return steps_per_m_; }
   /// Pixels [u0, u1] x [v0, v1], inside the image. Conservative. O(1).
   [[nodiscard]] Bound bound(int u0, int v0, int u1, int v1) const noexcept;
 
  private:
-  void fill_pixels(const firmware_if::DepthFrame& frame, Entry* pixel) noexcept;
+  void fill_tiles(const firmware_if::DepthFrame& frame, unsigned shift, Entry* tile) noexcept;
 
   std::size_t max_side_;
   float steps_per_m_{0.0F};

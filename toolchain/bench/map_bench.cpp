@@ -9,6 +9,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -45,9 +46,10 @@ class OwnMap {
     reset();
   }
   void reset() {
-    core::Arena arena(block_);
-    map_ = std::make_unique<stages::BrickMap>(config_, arena);
-    if (arena.exhausted()) std::abort();
+    map_.reset();
+    arena_.emplace(block_);  // the map keeps a record of its pool in it
+    map_ = std::make_unique<stages::BrickMap>(config_, *arena_);
+    if (arena_->exhausted()) std::abort();
   }
   std::uint64_t integrate(const Scan& scan, int level) {
     const std::array<Vector3, 1> here{scan.p_WB()};
@@ -70,6 +72,7 @@ class OwnMap {
  private:
   stages::BrickMap::Config config_;
   std::vector<std::byte> block_;
+  std::optional<core::Arena> arena_;
   std::unique_ptr<stages::BrickMap> map_;
 };
 

@@ -49,7 +49,7 @@ TEST_F(BlockSight, IsBitEqualOnEveryInstructionSet) {
     if (set == 0) continue;
     const InstructionSet only(set);
     ++sets;
-    for (int level = 0; level < 3; ++level) {
+    for (int level = 0; level < kPrecisionLevels; ++level) {
       BrickMap::Config config;
       config.bounds_W = {Vector3(-30, -30, -3), Vector3(30, 30, 12)};
       config.max_bricks = 2000;
@@ -62,12 +62,13 @@ TEST_F(BlockSight, IsBitEqualOnEveryInstructionSet) {
       IntegrationResult result;
       ASSERT_EQ(map.integrate({frames_, level, kInfinity, here}, unlimited, result), Status::kOk);
       ASSERT_EQ(map.integrate({frames_, level, kInfinity, here}, unlimited, result), Status::kOk);
-      EXPECT_GT(map.known_cells(), 10000U);
+      EXPECT_GT(map.known_cells(), level < 3 ? 10000U : 0U);
       digests.push_back(map.digest());
     }
   }
   ASSERT_GT(sets, 1);
-  for (std::size_t i = 3; i < digests.size(); ++i) EXPECT_EQ(digests[i], digests[i % 3]) << i;
+  for (std::size_t i = kPrecisionLevels; i < digests.size(); ++i)
+    EXPECT_EQ(digests[i], digests[i % kPrecisionLevels]) << i;
   EXPECT_NE(digests[0], digests[1]);
 }
 

@@ -17,11 +17,15 @@ TEST(Brick, MipsSayWhatTheCellsSay) {
   core::CounterRng rng(1);
   auto sut = std::make_unique<Brick>();
   sut->fill(evidence::kUnknown);
-  for (std::int8_t& c : sut->cell) {
-    const auto kind = rng.below(20);
-    c = kind == 0 ? evidence::kUnknown : (kind == 1 ? evidence::kHit : evidence::kFree);
+  std::size_t known = 0;
+  for (std::uint32_t m = 0; m < kCellsPerBrick; ++m) {
+    const auto kind = rng.below(30);
+    if (kind > 0)
+      sut->set_cell(m, kind < 9 ? evidence::kOccupied + static_cast<unsigned>(kind) : evidence::kFree);
+    known += kind > 0 ? 1U : 0U;
   }
   sut->refresh();
+  EXPECT_EQ(sut->known_count, known);
   for (int level = 1; level <= kBrickLevel; ++level) {
     const std::size_t size = std::size_t{1} << (3 * level);
     for (std::uint32_t m = 0; m < kCellsPerBrick / size; ++m) {
@@ -34,18 +38,44 @@ TEST(Brick, MipsSayWhatTheCellsSay) {
 }
 
 TEST(Brick, EvidenceIsBounded) {
-  std::int8_t cell = evidence::kUnknown;
-  cell = evidence::after_miss(cell);
+  unsigned cell = evidence::after_miss(evidence::kUnknown);
   EXPECT_EQ(cell, evidence::kFree);
+  const auto looks_until_free = [](unsigned occupied) {
+    int misses = 0;
+    for (; evidence::is_occupied(occupied); ++misses) occupied = evidence::after_miss(occupied);
+    return misses;
+  };
   cell = evidence::after_hit(cell);
-  EXPECT_GT(cell, 0) << "one surface is enough";
+  EXPECT_TRUE(evidence::is_occupied(cell)) << "one surface is enough";
+  EXPECT_EQ(looks_until_free(cell), 3) << "and survives two looks past it";
   for (int i = 0; i < 100; ++i) cell = evidence::after_hit(cell);
-  int misses = 0;
-  while (cell > 0) {
-    cell = evidence::after_miss(cell);
-    ++misses;
+  EXPECT_EQ(looks_until_free(cell), 8);
+}
+
+TEST(Brick, FreesBlocksAsItWouldTheirCells) {
+  core::CounterRng rng(7);
+  auto sut = std::make_unique<Brick>(), by_cell = std::make_unique<Brick>();
+  for (int level = 0; level <= kBrickLevel; ++level) {
+    for (int n = 0; n < 50; ++n) {
+      for (std::uint32_t m = 0; m < kCellsPerBrick; ++m) {
+        const auto kind = static_cast<unsigned>(rng.below(16));
+        const unsigned cell = kind > evidence::kOccupied ? kind : kind % 2;
+        sut->set_cell(m, cell);
+        by_cell->set_cell(m, cell);
+      }
+      const auto size = std::uint32_t{1} << (3 * level);
+      const auto parent =
+          static_cast<std::uint32_t>(level < kBrickLevel ? rng.below(kCellsPerBrick / size / 8) : 0);
+      const auto blocks = static_cast<std::uint8_t>(level < kBrickLevel ? rng.below(256) : 1);
+      sut->add_free(level, parent, blocks);
+      for (std::uint32_t i = 0; i < 8; ++i) {
+        if (((blocks >> i) & 1) == 0) continue;
+        for (std::uint32_t m = (8 * parent + i) * size; m < (8 * parent + i + 1) * size; ++m)
+          by_cell->set_cell(m, evidence::after_miss(by_cell->cell(m)));
+      }
+      ASSERT_EQ(sut->word, by_cell->word) << level;
+    }
   }
-  EXPECT_LE(misses, 10);
 }
 
 TEST(Morton, InterleavesThreeAxes) {
@@ -139,10 +169,57 @@ TEST_F(BrickMapTest, ACoarseLookNeverClearsAFineSurface) {
   }
   ASSERT_GT(surface.size(), 5U);
   for (int i = 0; i < 20; ++i)
-    (void)sut_->integrate({frames, 2 + i % 3, kInfinity, here}, unlimited_, result_);
+    (void)sut_->integrate({frames, 2 + i % 4, kInfinity, here}, unlimited_, result_);
   (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
   for (const Vector3& p : surface)
     EXPECT_EQ(sut_->view().at(p, lookups), CellState::kOccupied) << p.transpose();
+}
+
+TEST_F(BrickMapTest, ACoarseLookSeesWhatAppearsInFreeSpace) {
+  const std::array<Vector3, 1> here{at_};
+  test::Scene before = scene_;
+  before.solid.resize(1);  // the floor
+  for (int level = 1; level < kPrecisionLevels; ++level) {
+    std::vector<std::byte> block(64U << 20U);
+    core::Arena arena(block);
+    BrickMap map(config_, arena);
+    (void)map.integrate({before.look(at_), 0, kInfinity, here}, unlimited_, result_);
+    core::Work work;
+    (void)map.export_view({0, kInfinity, at_}, unlimited_, work);
+    std::uint64_t lookups = 0;
+    ASSERT_TRUE(is_segment_free(map.view(), at_, Vector3(7, 0.2, 5), 0.3, lookups));
+    ASSERT_EQ(map.integrate({scene_.look(at_), level, kInfinity, here}, unlimited_, result_), Status::kOk);
+    (void)map.export_view({0, kInfinity, at_}, unlimited_, work);
+    EXPECT_FALSE(is_segment_free(map.view(), at_, Vector3(7, 0.2, 5), 0.3, lookups)) << level;
+    EXPECT_TRUE(is_segment_free(map.view(), at_, Vector3(5, 0.2, 5), 0.3, lookups)) << "only where it is";
+  }
+}
+
+TEST_F(BrickMapTest, ACoarseLookNotesSurfacesInUnknownBricksUntilAFinerOne) {
+  const std::array<Vector3, 1> here{at_};
+  const auto frames = scene_.look(at_);
+  const auto cells = [this](int level) {
+    core::Work work;
+    (void)sut_->export_view({level, kInfinity, at_}, unlimited_, work);
+    std::array<int, 3> count{};
+    std::uint64_t lookups = 0;
+    for (double x = -13.35; x < 14; x += 0.3)
+      for (double y = -13.35; y < 14; y += 0.3)
+        for (const double z : {-0.15, 0.15})
+          ++count[static_cast<std::size_t>(sut_->view().at(Vector3(x, y, z), lookups))];
+    return count;
+  };
+  constexpr auto kOccupied = static_cast<std::size_t>(CellState::kOccupied),
+                 kFree = static_cast<std::size_t>(CellState::kFree);
+  ASSERT_EQ(sut_->integrate({frames, kBrickLevel, kInfinity, here}, unlimited_, result_), Status::kOk);
+  const std::uint64_t known = sut_->known_cells();
+  EXPECT_GT(cells(kBrickLevel)[kOccupied], 6000) << "the floor, in the upper or the lower of 2 x 8281 cells";
+  EXPECT_EQ(cells(kBrickLevel)[kFree], 0);
+  EXPECT_EQ(cells(0)[kOccupied], 0) << "where in the brick is not known";
+  (void)sut_->integrate({frames, kBrickLevel, kInfinity, here}, unlimited_, result_);
+  EXPECT_EQ(sut_->known_cells(), known) << "the same look again changes nothing";
+  (void)sut_->integrate({frames, 0, kInfinity, here}, unlimited_, result_);
+  EXPECT_GT(cells(0)[kOccupied], 1000);
 }
 
 class SmallBrickMap : public BrickMapTest {
@@ -293,8 +370,10 @@ TEST(DepthPyramid, BoundsEveryRectangle) {
   std::vector<std::byte> block(1U << 20U);
   core::Arena arena(block);
   DepthPyramid sut(arena, 96);
-  ASSERT_EQ(sut.build(frame), Status::kOk);
-  for (int n = 0; n < 2000; ++n) {
+  for (int n = 0; n < 4000; ++n) {
+    if (n % 1000 == 0) {
+      ASSERT_EQ(sut.build(frame, n / 1000), Status::kOk);
+    }
     const int u0 = static_cast<int>(rng.below(96)), v0 = static_cast<int>(rng.below(80));
     const int u1 = std::min(95, u0 + static_cast<int>(rng.below(40))),
               v1 = std::min(79, v0 + static_cast<int>(rng.below(40)));
