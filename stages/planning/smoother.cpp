@@ -18,7 +18,7 @@ constexpr double kProfileShare =
     0.60;  // of the acceleration limit: the curve around the profile needs the rest
 constexpr double kCornerCut_m = 0.3;  // how far a corner may be cut: the planner leaves about so much room
 constexpr double kLimitTolerance = 1.05;
-constexpr double kJerk_mps3 = 15.0;  // of a hop from rest to rest
+constexpr double kJerk_mps3 = 20.0;  // beyond it the vehicle overshoots the attitude
 constexpr int kSamples = 12;         // per segment, for the limits
 constexpr int kStretchRounds = 10;
 constexpr int kSplitRounds = 6;
@@ -36,17 +36,20 @@ double corner_speed_mps(const Vector3& before, const Vector3& after, double a_mp
   return std::sqrt(a_mps2 * kCornerCut_m * half / (1.0 - half));
 }
 
-/// Raises the squares of speed and acceleration to those at one instant.
-void add_motion(const PolynomialSegment& segment, double at_s, double& speed2,
-                double& acceleration2) noexcept {
+/// Raises the squares of speed, acceleration and jerk to those at one instant.
+void add_motion(const PolynomialSegment& segment, double at_s, double& speed2, double& acceleration2,
+                double& jerk2) noexcept {
   Vector3 v_W = Vector3::Zero();
   Vector3 a_W = Vector3::Zero();
+  Vector3 half_j_W = Vector3::Zero();
   for (std::size_t k = PolynomialSegment::kCoefficients; k-- > 1;) {
+    half_j_W = half_j_W * at_s + a_W;
     a_W = a_W * at_s + v_W;
     v_W = v_W * at_s + static_cast<double>(k) * segment.coefficient[k];
   }
   speed2 = std::max(speed2, v_W.squaredNorm());
   acceleration2 = std::max(acceleration2, a_W.squaredNorm());
+  jerk2 = std::max(jerk2, 4.0 * half_j_W.squaredNorm());
 }
 
 }  // namespace
@@ -134,6 +137,7 @@ bool Smoother::stretch_to_limits(Plan& plan, const SmoothRequest& request, const
   const double speed_limit = std::max(limits.speed_mps * kLimitTolerance, request.start.v_W.norm() + 0.01);
   const double acceleration_limit =
       std::max(limits.acceleration_mps2 * kLimitTolerance, request.start.a_W.norm() + 0.01);
+  const double jerk_limit = std::max(kJerk_mps3 * kLimitTolerance, request.start.j_W.norm() + 0.01);
   for (int round = 0; round < kStretchRounds; ++round) {
     if (!solve(plan, request.start, out)) return false;
     bool fine = true;
@@ -141,10 +145,14 @@ bool Smoother::stretch_to_limits(Plan& plan, const SmoothRequest& request, const
       // Compared as squares; the roots are taken once.
       double speed2 = 0.0;
       double acceleration2 = 0.0;
+      double jerk2 = 0.0;
       for (int i = 0; i <= kSamples; ++i)
-        add_motion(out.segment[k], out.segment[k].duration_s * i / kSamples, speed2, acceleration2);
-      const double worst = std::max(
-          {1.0, std::sqrt(speed2) / speed_limit, std::sqrt(std::sqrt(acceleration2) / acceleration_limit)});
+        add_motion(out.segment[k], out.segment[k].duration_s * i / kSamples, speed2, acceleration2, jerk2);
+      // By how much longer the segment must be: the cube root is near enough to the power 3/8.
+      const double jerk_root = std::sqrt(std::sqrt(std::sqrt(std::sqrt(jerk2) / jerk_limit)));
+      const double worst = std::max({1.0, std::sqrt(speed2) / speed_limit,
+                                     std::sqrt(std::sqrt(acceleration2) / acceleration_limit),
+                                     jerk_root * jerk_root * jerk_root});
       if (worst > 1.0) {
         fine = false;
         plan.time_s[k + 1] *= std::min(1.0 + 1.1 * (worst - 1.0) + 0.02, 1.5);

@@ -117,7 +117,7 @@ inline void expect_safe(const RandomWorldsResult& result, int worlds) {
   EXPECT_LE(result.fastest_plan_mps, 6.0 * 1.10);
   EXPECT_LE(result.hardest_plan_mps2, 4.0 * 1.20);
   EXPECT_LE(result.most_tilted_plan_rad, 0.60) << "what the tracker allows";
-  EXPECT_LE(result.most_tilted_rad, 0.60 + 0.10) << "a gust while it is at its limit";
+  EXPECT_LE(result.most_tilted_rad, 0.62) << "a gust while it is at its limit";
 }
 
 }  // namespace roborun::app
