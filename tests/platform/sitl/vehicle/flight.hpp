@@ -20,8 +20,8 @@ inline Trajectory straight(const Vector3& from_W, const Vector3& to_W, double sp
 class Flight {
  public:
   static constexpr Nanos kFrame{2'500'000};
-  explicit Flight(std::uint64_t seed)
-      : vehicle_({}, {}, Vector3::Zero(), seed), sensors_({}, seed), lane_({}, {}) {
+  explicit Flight(std::uint64_t seed, const sitl::WindConfig& wind = {})
+      : vehicle_({}, wind, Vector3::Zero(), seed), sensors_({}, seed), lane_({}, {}) {
     lane_.set_take_off([](const Vector3& ground_W, MonotonicTime start) {
       return straight(ground_W, ground_W + Vector3(0.0, 0.0, 5.0), 1.5, start);
     });
