@@ -20,6 +20,7 @@
 #include "stages/perception/block_sight.hpp"
 #include "stages/perception/brick.hpp"
 #include "stages/perception/depth_pyramid.hpp"
+#include "stages/perception/frame_guard.hpp"
 #include "stages/perception/occupancy_map.hpp"
 
 namespace roborun::stages {
@@ -84,6 +85,8 @@ class BrickMap final : public OccupancyMap, private MapView {
 
   [[nodiscard]] std::size_t usable_frames(const IntegrationRequest& request,
                                           IntegrationResult& result) noexcept;
+  /// A frame without any surface, where the map has surfaces in its view: more likely a white image.
+  [[nodiscard]] bool is_white(const PosedDepthFrame& posed) const noexcept;
   /// A unit is what v0 is spent in: a brick, or a block of 2^3 bricks (one cell of the coarsest level) if p0
   /// is that coarse or v0 is enough for everything in reach.
   struct Position {
@@ -156,6 +159,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   int unit_level_{kBrickLevel};
   std::size_t free_count_{0};
   std::size_t dirty_count_{0};
+  FrameGuard guard_{};
   SightCameras cameras_{};
   BrickSeen seen_{};
   SurfaceRow row_{};
