@@ -133,7 +133,11 @@ class BrickMap final : public OccupancyMap, private MapView {
   [[nodiscard]] bool paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
   void free_vehicle() noexcept;
   [[nodiscard]] bool cell_of(const Vector3& p_W, Cell& cell) const noexcept;
-  [[nodiscard]] std::size_t slot_of(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
+  [[nodiscard]] std::size_t slot_of(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
+    return (static_cast<std::size_t>(bz) * static_cast<std::size_t>(ny_) + static_cast<std::size_t>(by)) *
+               static_cast<std::size_t>(nx_) +
+           static_cast<std::size_t>(bx);
+  }
   /// nullptr where nothing is known.
   [[nodiscard]] const Brick* brick_at(std::size_t position) const noexcept;
   [[nodiscard]] const Brick* visible_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;

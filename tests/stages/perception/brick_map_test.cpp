@@ -300,6 +300,26 @@ TEST_F(SmallBrickMap, GivesUpTheFarthestBricksWhenFull) {
   EXPECT_TRUE(sut_->view().is_free(Aabb::around(Vector3(20, 10, 5), 0.2), lookups)) << "what is near stays";
 }
 
+TEST_F(SmallBrickMap, TakesNoNewSpaceWhenAllItHasIsNear) {
+  const std::array<Vector3, 1> here{at_};
+  (void)sut_->integrate({scene_.look(at_), 0, kInfinity, here}, unlimited_, result_);
+  EXPECT_GT(sut_->counters().bricks_refused, 0U);
+  EXPECT_EQ(sut_->counters().bricks_given_up, 0U) << "nothing that this scan needs";
+  core::Work work;
+  (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
+  std::uint64_t lookups = 0;
+  EXPECT_TRUE(sut_->view().is_free(Aabb::around(at_, 0.5), lookups));
+  EXPECT_EQ(sut_->view().at(Vector3(7, 0, 5), lookups), CellState::kUnknown) << "inside the pillar";
+  for (double x = 0.15; x < 20; x += 0.3) {
+    for (double z = 0.15; z < 10; z += 0.3) {
+      const Vector3 p(x, 0.2, z);
+      if (scene_.occupied(p - Vector3(0.3, 0, 0)) && scene_.occupied(p + Vector3(0.3, 0, 0))) {
+        EXPECT_NE(sut_->view().at(p, lookups), CellState::kFree) << p.transpose();
+      }
+    }
+  }
+}
+
 TEST_F(BrickMapTest, WorksWithoutTheHeap) {
   const auto frames = scene_.look(at_);
   const std::array<Vector3, 1> here{at_};
