@@ -220,7 +220,8 @@ std::size_t BrickMap::clear_units(std::size_t count, const IntegrationRequest& r
         free_unit(unit);
         work.volume_m3 += volume_m3(center_W[i], cell_size_m(unit_level_));
       } else if (((eight.mixed >> i) & 1U) != 0 && finest < unit_level_) {
-        if (!clear_unit(unit, eight.cameras[i], finest, budget, work)) return first + i;
+        if (!clear_unit(unit, eight.cameras[i], finest, budget, work))
+          return first + i + 1;  // what was cleared in it needs its surfaces
       }
       if (work.volume_m3 >= request.volume_m3) return first + i + 1;
     }
