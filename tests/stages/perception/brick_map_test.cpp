@@ -342,41 +342,6 @@ TEST_F(BrickMapTest, StopsWhenTheBudgetIsSpent) {
   EXPECT_LT(result_.work.units, 2000U + 1024U + 6U * 64U * 64U);
 }
 
-TEST_F(BrickMapTest, WhereTheBudgetEndsNoSurfaceIsLeftOut) {
-  class Short final : public core::StageBudget {
-   public:
-    explicit Short(std::uint64_t units) : units_(units) {}
-    [[nodiscard]] bool spent(const core::Work& done) noexcept override { return done.units > units_; }
-
-   private:
-    std::uint64_t units_;
-  };
-  // In the rim of its cells: seen past, and still solid.
-  scene_.solid[0].max_W.z() = 0.05;
-  const auto frames = scene_.look(at_);
-  const std::array<Vector3, 1> here{at_};
-  int cut_short = 0;
-  for (std::uint64_t units = 20; units < 20000; units = units * 5 / 4) {
-    for (const double volume_m3 : {kInfinity, 30e3}) {  // in blocks and in bricks
-      std::vector<std::byte> block(64U << 20U);
-      core::Arena arena(block);
-      BrickMap map(config_, arena);
-      Short budget(units);
-      cut_short +=
-          map.integrate({frames, 0, volume_m3, here}, budget, result_) == Status::kBudgetSpent ? 1 : 0;
-      core::Work work;
-      (void)map.export_view({0, kInfinity, at_}, unlimited_, work);
-      std::uint64_t lookups = 0;
-      int free = 0;
-      for (double x = -8.85; x < 9; x += 0.3)
-        for (double y = -8.85; y < 9; y += 0.3)
-          free += map.view().at(Vector3(x, y, 0.15), lookups) == CellState::kFree ? 1 : 0;
-      ASSERT_EQ(free, 0) << units << " " << volume_m3;
-    }
-  }
-  EXPECT_GT(cut_short, 20);
-}
-
 TEST_F(BrickMapTest, AViewIsUnknownBeyondItsVolume) {
   const std::array<Vector3, 1> here{at_};
   (void)sut_->integrate({scene_.look(at_), 0, kInfinity, here}, unlimited_, result_);
