@@ -35,13 +35,16 @@ class Panel {
     svg_.add(R"(<line x1="{1}" x2="{2}" y1="{0:.1f}" y2="{0:.1f}" stroke="#e4e7eb"/>)", y(value), left_, left_ + kWidth);
     svg_.text(left_ - 6, y(value) + 4, fmt::format("{:g}", value), "end", 11);
   }
-  void line(const std::vector<Point>& points, const std::string& colour, bool dashed, const std::string& name) const {
+  void line(const std::vector<Point>& points, const std::string& colour, bool dashed, const std::string& name,
+            bool at_start) const {
     std::string path;
     for (const Point& p : points) path += fmt::format("{:.1f},{:.1f} ", x(p.x), y(p.y));
     svg_.add(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="2"{}/>)", path, colour,
              dashed ? R"( stroke-dasharray="6 4")" : "");
     for (const Point& p : points) svg_.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="3" fill="{}"/>)", x(p.x), y(p.y), colour);
-    svg_.text(std::min(x(points.back().x) + 6, left_ + kWidth - 4), y(points.back().y) - 8, name, "end", 11, colour.c_str());
+    const Point& named = at_start ? points.front() : points.back();
+    svg_.text(x(named.x) + (at_start ? 10 : 6), y(named.y) - (at_start ? 4 : 8), name, at_start ? "start" : "end", 11,
+              colour.c_str());
   }
 
  private:
@@ -73,10 +76,10 @@ std::string map_cost_svg(const std::vector<CostAtPrecision>& precision, const st
       stock.push_back({c.p0_m, c.stock_ms});
     }
     const std::string colour = report::ramp_colour(range_m == 20 ? 0.6 : 0.2);
-    if (!own.empty()) left.line(own, colour, false, fmt::format("own, {} m", range_m));
-    if (!stock.empty()) left.line(stock, colour, true, fmt::format("stock, {} m", range_m));
+    if (!own.empty()) left.line(own, colour, false, fmt::format("own, {} m", range_m), true);
+    if (!stock.empty()) left.line(stock, colour, true, fmt::format("stock, {} m", range_m), true);
   }
-  svg.text(520, 48, "own time over volume and over surface, range growing, shortest = 1", "start", 12);
+  svg.text(520, 48, "own time over volume and surface, 10 to 40 m; 10 m is 1", "start", 12);
   double furthest = 2, highest = 2;
   std::vector<Point> volume, surface;
   for (const CostOfSpace& c : space) {
@@ -92,8 +95,8 @@ std::string map_cost_svg(const std::vector<CostAtPrecision>& precision, const st
     if (v < 1.5 * highest) right.tick_y(std::round(v));
   }
   if (!space.empty()) {
-    right.line(volume, report::ramp_colour(0.2), false, "volume");
-    right.line(surface, report::ramp_colour(0.75), false, "surface");
+    right.line(volume, report::ramp_colour(0.2), false, "volume", false);
+    right.line(surface, report::ramp_colour(0.75), false, "surface", false);
   }
   return svg.finish(920, 400);
 }
