@@ -382,11 +382,11 @@ void end_cells_lanes(const PixelLine& line, std::span<const float> depth_m, floa
     };
     const auto is_new = hn::Or(differs(0), hn::Or(differs(1), differs(2)));
     const auto keep = hn::And(is_new, hn::Gt(hn::Load(di, cell[0] + kPad + u), hn::Set(di, kNone)));
-    std::size_t kept = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      kept =
-          hn::CompressStore(hn::Load(di, cell[axis] + kPad + u), keep, di, row.cell[axis].data() + row.count);
-    row.count += kept;
+    // Not CompressStore(): Highway 1.0 copies its table of 1 KiB to the stack at each call.
+    for (unsigned bits = bits_of(hn::RebindMask(d, keep)); bits != 0; bits &= bits - 1, ++row.count) {
+      const std::size_t at = kPad + u + static_cast<std::size_t>(__builtin_ctz(bits));
+      for (std::size_t axis = 0; axis < 3; ++axis) row.cell[axis][row.count] = cell[axis][at];
+    }
   }
 }
 
@@ -442,15 +442,20 @@ bool tile_steps_lanes(const DepthStrip& strip, int shift, DepthPyramid::Entry* e
 
 PixelCounts pixel_counts_lanes(std::span<const float> depth_m, float range_m) {
   const Floats d;
+  const Ints di;
   const std::size_t lanes = hn::Lanes(d);
-  const auto range = hn::Set(d, range_m);
-  PixelCounts counts;
+  const auto range = hn::Set(d, range_m), zero = hn::Zero(d);
+  const auto minus_one = [&](auto mask) { return hn::VecFromMask(di, hn::RebindMask(di, mask)); };
+  auto informed = hn::Zero(di), surfaces = hn::Zero(di);
   std::size_t i = 0;
   for (; i + lanes <= depth_m.size(); i += lanes) {
-    const auto known = hn::Gt(hn::LoadU(d, depth_m.data() + i), hn::Zero(d));
-    counts.informed += hn::CountTrue(d, known);
-    counts.surfaces += hn::CountTrue(d, hn::And(known, hn::Lt(hn::LoadU(d, depth_m.data() + i), range)));
+    const auto raw = hn::LoadU(d, depth_m.data() + i);
+    const auto known = hn::Gt(raw, zero);
+    informed = hn::Sub(informed, minus_one(known));
+    surfaces = hn::Sub(surfaces, minus_one(hn::And(known, hn::Lt(raw, range))));
   }
+  PixelCounts counts{static_cast<std::size_t>(hn::GetLane(hn::SumOfLanes(di, informed))),
+                     static_cast<std::size_t>(hn::GetLane(hn::SumOfLanes(di, surfaces)))};
   for (; i < depth_m.size(); ++i) {
     counts.informed += depth_m[i] > 0.0F ? 1U : 0U;
     counts.surfaces += depth_m[i] > 0.0F && depth_m[i] < range_m ? 1U : 0U;

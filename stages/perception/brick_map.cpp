@@ -86,12 +86,6 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
   for (std::size_t i = 0; i < config.max_frames; ++i) pyramid_[i].emplace(arena, config.max_image_side);
 }
 
-std::size_t BrickMap::slot_of(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
-  return (static_cast<std::size_t>(bz) * static_cast<std::size_t>(ny_) + static_cast<std::size_t>(by)) *
-             static_cast<std::size_t>(nx_) +
-         static_cast<std::size_t>(bx);
-}
-
 const Brick* BrickMap::brick_at(std::size_t position) const noexcept {
   switch (const std::int32_t slot = slot_[position]) {
     case kUnknownBrick:

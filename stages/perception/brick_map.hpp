@@ -20,6 +20,7 @@
 #include "stages/perception/block_sight.hpp"
 #include "stages/perception/brick.hpp"
 #include "stages/perception/depth_pyramid.hpp"
+#include "stages/perception/frame_guard.hpp"
 #include "stages/perception/occupancy_map.hpp"
 
 namespace roborun::stages {
@@ -89,6 +90,8 @@ class BrickMap final : public OccupancyMap, private MapView {
 
   [[nodiscard]] std::size_t usable_frames(const IntegrationRequest& request,
                                           IntegrationResult& result) noexcept;
+  /// A frame without any surface, where the map has surfaces in its view: more likely a white image.
+  [[nodiscard]] bool is_white(const PosedDepthFrame& posed) const noexcept;
   /// A unit is what v0 is spent in: a brick, or a block of 2^3 bricks (one cell of the coarsest level) if p0
   /// is that coarse or v0 is enough for everything in reach.
   struct Position {
@@ -135,7 +138,11 @@ class BrickMap final : public OccupancyMap, private MapView {
   [[nodiscard]] bool paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
   void free_vehicle() noexcept;
   [[nodiscard]] bool cell_of(const Vector3& p_W, Cell& cell) const noexcept;
-  [[nodiscard]] std::size_t slot_of(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
+  [[nodiscard]] std::size_t slot_of(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
+    return (static_cast<std::size_t>(bz) * static_cast<std::size_t>(ny_) + static_cast<std::size_t>(by)) *
+               static_cast<std::size_t>(nx_) +
+           static_cast<std::size_t>(bx);
+  }
   /// No deeper than to cells of `level`; bricks farther than `radius_m` from view_center_W_ are unknown.
   [[nodiscard]] bool box_free(const Aabb& box_W, int level, double radius_m,
                               std::uint64_t& lookups) const noexcept;
@@ -165,6 +172,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   int unit_level_{kBrickLevel};
   std::size_t free_count_{0};
   std::size_t dirty_count_{0};
+  FrameGuard guard_{};
   SightCameras cameras_{};
   BrickSeen seen_{};
   SurfaceRow row_{};

@@ -26,9 +26,10 @@ int tile_shift(const firmware_if::DepthFrame& frame, int level) noexcept {
 
 std::size_t BrickMap::usable_frames(const IntegrationRequest& request, IntegrationResult& result) noexcept {
   cameras_.count = 0;
+  guard_.begin(request.frames);
   for (std::size_t i = 0; i < request.frames.size(); ++i) {
     const PosedDepthFrame& posed = request.frames[i];
-    if (cameras_.count == config_.max_frames || check_frame(posed) != Status::kOk ||
+    if (cameras_.count == config_.max_frames || guard_.check(posed) != Status::kOk || is_white(posed) ||
         pyramid_[cameras_.count]->build(posed.frame, tile_shift(posed.frame, request.level)) != Status::kOk) {
       ++result.frames_refused;
       continue;
@@ -60,6 +61,42 @@ BrickMap::Position BrickMap::unit_at(std::uint32_t index) const noexcept {
 
 Vector3 BrickMap::unit_center_W(const Position& unit) const noexcept {
   return corner_W_ + cell_size_m(unit_level_) * Vector3(unit.x + 0.5, unit.y + 0.5, unit.z + 0.5);
+}
+
+bool BrickMap::is_white(const PosedDepthFrame& posed) const noexcept {
+  constexpr int kRays = 8;          // in each direction
+  constexpr int kLeastBlocked = 3;  // one may be a stray cell
+  constexpr double kStep_m = 0.5 * kBrick_m, kFineStep_m = 0.5 * kFinestCell_m;
+  const firmware_if::DepthFrame& frame = posed.frame;
+  if (posed.is_cloud || pixel_counts(frame.depth_m, frame.range_m).surfaces > 0) return false;
+  const double end_m = 0.8 * static_cast<double>(frame.range_m);
+  const auto meets_surface = [&](const Vector3& ray_W) {
+    const double length = ray_W.norm();
+    Cell cell{};
+    for (double far_m = kStep_m / length; far_m < end_m; far_m += kStep_m / length) {
+      if (!cell_of(posed.X_WC.p_RT + far_m * ray_W, cell)) return false;
+      const Brick* brick =
+          brick_at(slot_of(cell.x >> kBrickLevel, cell.y >> kBrickLevel, cell.z >> kBrickLevel));
+      if (brick == nullptr || (brick->flags(kBrickLevel, 0) & content::kOccupied) == 0) continue;
+      for (double at_m = far_m - kStep_m / length; at_m < far_m; at_m += kFineStep_m / length) {
+        if (!cell_of(posed.X_WC.p_RT + at_m * ray_W, cell)) return false;
+        brick = brick_at(slot_of(cell.x >> kBrickLevel, cell.y >> kBrickLevel, cell.z >> kBrickLevel));
+        if (brick != nullptr &&
+            evidence::is_occupied(brick->cell(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)))))
+          return true;
+      }
+    }
+    return false;
+  };
+  int blocked = 0;
+  for (int v = 0; v < kRays; ++v) {
+    for (int u = 0; u < kRays; ++u) {
+      const double t = static_cast<double>(frame.tan_half_fov_ratio);
+      const Vector3 ray_C(1.0, t * (1.0 - (2.0 * u + 1.0) / kRays), t * (1.0 - (2.0 * v + 1.0) / kRays));
+      blocked += meets_surface(posed.X_WC.R_RT * ray_C) ? 1 : 0;
+    }
+  }
+  return blocked >= kLeastBlocked;
 }
 
 double BrickMap::volume_m3(const Vector3& center_W, double edge_m) const noexcept {
@@ -183,7 +220,8 @@ std::size_t BrickMap::clear_units(std::size_t count, const IntegrationRequest& r
         free_unit(unit);
         work.volume_m3 += volume_m3(center_W[i], cell_size_m(unit_level_));
       } else if (((eight.mixed >> i) & 1U) != 0 && finest < unit_level_) {
-        if (!clear_unit(unit, eight.cameras[i], finest, budget, work)) return first + i;
+        if (!clear_unit(unit, eight.cameras[i], finest, budget, work))
+          return first + i + 1;  // what was cleared in it needs its surfaces
       }
       if (work.volume_m3 >= request.volume_m3) return first + i + 1;
     }

@@ -7,19 +7,6 @@
 
 namespace roborun::stages {
 
-Status check_frame(const PosedDepthFrame& posed) noexcept {
-  const firmware_if::DepthFrame& f = posed.frame;
-  const bool size_ok = f.width >= 8 && f.height >= 8 && f.width <= DepthPyramid::kMaxPixels &&
-                       f.height <= DepthPyramid::kMaxPixels &&
-                       f.depth_m.size() == std::size_t{f.width} * std::size_t{f.height};
-  const bool optics_ok = f.range_m > 0.0F && f.range_m <= kMaxRange_m && f.tan_half_fov_ratio > 0.0F &&
-                         f.tan_half_fov_ratio <= kMaxTanHalfFov;
-  if (!size_ok || !optics_ok || !is_finite(posed.X_WC.p_RT) || !posed.X_WC.R_RT.allFinite())
-    return Status::kInvalidArgument;
-  const bool any_valid = std::any_of(f.depth_m.begin(), f.depth_m.end(), [](float d) { return d > 0.0F; });
-  return any_valid ? Status::kOk : Status::kInvalidArgument;
-}
-
 namespace {
 
 using Entry = DepthPyramid::Entry;

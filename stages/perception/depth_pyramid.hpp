@@ -14,11 +14,6 @@ namespace roborun::stages {
 inline constexpr float kMaxRange_m = 300.0F;
 inline constexpr float kMaxTanHalfFov = 2.0F;
 
-/// kOk if a frame may be used at all: 8..512 pixels a side, as many depths as pixels, range in (0,
-/// kMaxRange_m] and field of view in (0, kMaxTanHalfFov], finite pose, and at least one pixel that is not NaN
-/// or <= 0. Otherwise kInvalidArgument. O(pixels) at worst.
-[[nodiscard]] Status check_frame(const PosedDepthFrame& posed) noexcept;
-
 /// Visible depth of a pixel: its depth, or the range where nothing returned; 0 where there is no information.
 [[nodiscard]] inline float visible_depth_m(float depth_m, float range_m) noexcept {
   if (!(depth_m > 0.0F)) return 0.0F;

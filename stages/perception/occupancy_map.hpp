@@ -17,6 +17,7 @@ namespace roborun::stages {
 struct PosedDepthFrame {
   firmware_if::DepthFrame frame{};
   Pose X_WC{};
+  bool is_cloud{false};  ///< Made from a cloud (cloud_images.hpp): most pixels may have no information.
 };
 
 struct IntegrationRequest {
@@ -28,9 +29,8 @@ struct IntegrationRequest {
 };
 
 struct IntegrationResult {
-  core::Work work{};  ///< units: cells and nodes visited; volume_m3: space updated.
-  std::uint32_t
-      frames_refused{};  ///< Frames with a wrong size, a non-finite pose or no valid pixel: not used at all.
+  core::Work work{};               ///< units: cells and nodes visited; volume_m3: space updated.
+  std::uint32_t frames_refused{};  ///< Not used at all: check_frame(), and in the own map FrameGuard.
 };
 
 struct ExportRequest {

@@ -5,7 +5,6 @@
 
 #include "core/precision.hpp"
 #include "core/random/counter_rng.hpp"
-#include "stages/perception/depth_pyramid.hpp"
 
 namespace roborun::stages {
 
@@ -55,11 +54,12 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core
   work = {};
   work.level = level;
   const double cell_m = cell_size_m(level);
+  guard_.begin(frames);
   std::size_t usable = 0;
   bool full = false;
   bool spent = false;
   for (const PosedDepthFrame& posed : frames) {
-    if (check_frame(posed) != Status::kOk) {
+    if (guard_.check(posed) != Status::kOk) {
       ++counters_.frames_refused;
       continue;
     }

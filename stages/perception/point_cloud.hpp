@@ -8,6 +8,7 @@
 
 #include "core/executive/stage_budget.hpp"
 #include "core/memory/arena.hpp"
+#include "stages/perception/frame_guard.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/stage.hpp"
 
@@ -39,8 +40,8 @@ class PointCloud {
   /// Precondition: config.validate() is kOk. Check arena.exhausted() afterwards.
   PointCloud(const Config& config, core::Arena& arena) noexcept;
 
-  /// Averages the surfaces of all frames in cells of cell_size_m(level). Bad frames are refused whole and
-  /// counted; when three quarters of the grid are full, further new cells are dropped and counted
+  /// Averages the surfaces of all frames in cells of cell_size_m(level). Bad frames (FrameGuard) are refused
+  /// whole and counted; when three quarters of the grid are full, further new cells are dropped and counted
   /// (kCapacity). kInvalidArgument if no frame was usable. work.units counts pixels. RT-safe: O(pixels),
   /// polls the budget every row: kBudgetSpent.
   [[nodiscard]] Status step(std::span<const PosedDepthFrame> frames, int level, core::StageBudget& budget,
@@ -65,6 +66,7 @@ class PointCloud {
   std::span<CloudPoint> point_;
   core::PoolRecord& point_pool_;
   std::span<std::uint32_t> used_;  ///< Grid entries to clear before the next step.
+  FrameGuard guard_{};
   std::size_t count_{0};
   double seen_volume_m3_{0.0};
   double low_m_{-1e9};

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <fstream>
 #include <limits>
 #include <map>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "core/precision.hpp"
 #include "stages/perception/brick_map.hpp"
 #include "tests/support/no_alloc_scope.hpp"
+#include "toolchain/bench/map_plot.hpp"
 #include "toolchain/bench/stock_octomap.hpp"
 
 namespace roborun::bench {
@@ -64,6 +66,7 @@ class OwnMap {
     (void)map_->export_view({0, kInfinity, Vector3::Zero()}, unlimited, work);
     return map_->view();
   }
+  [[nodiscard]] double known_m3() const { return map_->known_volume_m3(); }
   /// Memory that the known space needs, for each cell of it.
   [[nodiscard]] double bytes_per_cell() const {
     return static_cast<double>(map_->used_bytes()) / static_cast<double>(map_->known_cells());
@@ -214,11 +217,46 @@ Agreement agreement(int range_m) {
   return result;
 }
 
+/// Own map at 0.3 m over growing range: the best of some scans, and what it then knows.
+std::vector<CostOfSpace> costs_of_space() {
+  std::vector<CostOfSpace> costs;
+  for (const int range_m : {10, 15, 20, 30, 40}) {
+    const Scan& scan = scan_of(0, 128, range_m);
+    OwnMap& map = own_map(128, range_m);
+    CostOfSpace cost{static_cast<double>(range_m), kInfinity, 0.0, 0.0};
+    for (int n = 0; n < 7; ++n) {
+      map.reset();
+      const double begin_s = cpu_s();
+      (void)map.integrate(scan, 0);
+      cost.own_ms = std::fmin(cost.own_ms, 1e3 * (cpu_s() - begin_s));
+    }
+    cost.known_m3 = map.known_m3();
+    const stages::MapView& view = map.view();
+    std::uint64_t lookups = 0;
+    const double reach_m = 1.8 * range_m;
+    for (double z = -0.45; z < reach_m; z += kFinestCell_m)
+      for (double y = -reach_m; y < reach_m; y += kFinestCell_m)
+        for (double x = -reach_m; x < reach_m; x += kFinestCell_m)
+          cost.surface_cells += view.at(Vector3(x, y, z), lookups) == stages::CellState::kOccupied ? 1.0 : 0.0;
+    std::printf("own at %d m: %.3f ms, %.0f m3 known, %.0f surface cells\n", range_m, cost.own_ms, cost.known_m3,
+                cost.surface_cells);
+    costs.push_back(cost);
+  }
+  return costs;
+}
+
 }  // namespace
 }  // namespace roborun::bench
 
 int main(int argc, char** argv) {
   using namespace roborun::bench;
+  std::string picture;
+  if (argc > 2 && std::string(argv[1]) == "--svg") {
+    picture = argv[2];
+    argv[2] = argv[0];
+    argc -= 2;
+    argv += 2;
+  }
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   std::size_t registered = 0;
@@ -238,6 +276,23 @@ int main(int argc, char** argv) {
       const Case c{level, range_m, 128, false};
       worst = std::fmin(worst, reporter.best_stock_ms(c) / reporter.ms(name_of("own", c)));
     }
+  if (!picture.empty()) {
+    std::vector<CostAtPrecision> precision;
+    for (const int range_m : {20, 40}) {
+      for (int level = 0; level < roborun::kPrecisionLevels; ++level) {
+        const Case c{level, range_m, 128, false};
+        precision.push_back(
+            {range_m, roborun::cell_size_m(level), reporter.ms(name_of("own", c)), reporter.best_stock_ms(c)});
+      }
+    }
+    std::ofstream file(picture);
+    file << map_cost_svg(precision, costs_of_space());
+    file.close();
+    if (!file) {
+      std::fprintf(stderr, "%s: cannot be written\n", picture.c_str());
+      return 2;
+    }
+  }
   const auto own_ms = [&](int level, int range_m) { return reporter.ms(name_of("own", {level, range_m, 128, false})); };
   const auto plain = [&](int range_m) {
     return reporter.ms(name_of("stock_plain", {0, range_m, 128, false})) / own_ms(0, range_m);

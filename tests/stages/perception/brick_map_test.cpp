@@ -222,6 +222,65 @@ TEST_F(BrickMapTest, ACoarseLookNotesSurfacesInUnknownBricksUntilAFinerOne) {
   EXPECT_GT(cells(0)[kOccupied], 1000);
 }
 
+/// What a pillar of the scene leaves in the map over many scans.
+class Ageing : public BrickMapTest {
+ protected:
+  void see(test::Scene& scene, int level = 0) {
+    const std::array<Vector3, 1> here{at_};
+    ASSERT_EQ(sut_->integrate({scene.look(at_), level, kInfinity, here}, unlimited_, result_), Status::kOk);
+  }
+  int occupied(const Aabb& box) {
+    core::Work work;
+    (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
+    std::uint64_t lookups = 0;
+    int count = 0;
+    for (double x = box.min_W.x(); x <= box.max_W.x(); x += 0.3)
+      for (double y = box.min_W.y(); y <= box.max_W.y(); y += 0.3)
+        for (double z = box.min_W.z(); z <= box.max_W.z(); z += 0.3)
+          count += sut_->view().at(Vector3(x, y, z), lookups) == CellState::kOccupied ? 1 : 0;
+    return count;
+  }
+  const Aabb front_{Vector3(5.85, -1.95, 1.05), Vector3(6.15, 1.95, 8.0)};
+};
+
+TEST_F(Ageing, AnObstacleThatMovedAwayIsClearAfterTenScansAtMost) {
+  test::Scene gone = scene_;
+  gone.solid.erase(gone.solid.begin() + 1);
+  for (const int seen : {1, 3, 100}) {
+    for (int i = 0; i < seen; ++i) see(scene_);
+    ASSERT_GT(occupied(front_), 100);
+    int scans = 0;
+    while (occupied(front_) > 0 && scans < 20) {
+      see(gone);
+      ++scans;
+    }
+    EXPECT_LE(scans, 10) << "seen " << seen << " times";
+    EXPECT_GE(scans, 3) << "one bad image is not enough";
+  }
+}
+
+TEST_F(Ageing, OneThatStaysNeverClears) {
+  see(scene_);
+  const int first = occupied(front_);
+  ASSERT_GT(first, 100);
+  for (int i = 0; i < 100; ++i) see(scene_, i % kPrecisionLevels);
+  EXPECT_EQ(occupied(front_), first);
+}
+
+TEST_F(Ageing, AThinOneSeenEveryThirdTimeDoesNotVanish) {
+  test::Scene missed = scene_;  // a wire that falls between two pixels
+  scene_.solid.push_back({Vector3(3.0, 1.02, 0), Vector3(3.05, 1.07, 12)});
+  const Aabb wire{Vector3(3.0, 1.05, 3.05), Vector3(3.0, 1.05, 6.0)};
+  see(scene_);
+  ASSERT_GT(occupied(wire), 3);
+  int least = 1000;
+  for (int i = 0; i < 30; ++i) {
+    see(i % 3 == 2 ? scene_ : missed);
+    if (i > 2) least = std::min(least, occupied(wire));
+  }
+  EXPECT_GT(least, 3);
+}
+
 class SmallBrickMap : public BrickMapTest {
  protected:
   SmallBrickMap() : BrickMapTest(64) {}
@@ -233,12 +292,32 @@ TEST_F(SmallBrickMap, GivesUpTheFarthestBricksWhenFull) {
     const std::array<Vector3, 1> here{p};
     (void)sut_->integrate({scene_.look(p), 0, kInfinity, here}, unlimited_, result_);
   }
-  EXPECT_GT(sut_->counters().bricks_given_up + sut_->counters().bricks_refused, 0U);
+  EXPECT_GT(sut_->counters().bricks_given_up, 0U);
   EXPECT_LE(sut_->used_bytes(), 64 * sizeof(Brick) + 2048 * sizeof(std::int32_t));
   core::Work work;
   (void)sut_->export_view({0, kInfinity, Vector3(20, 10, 5)}, unlimited_, work);
   std::uint64_t lookups = 0;
   EXPECT_TRUE(sut_->view().is_free(Aabb::around(Vector3(20, 10, 5), 0.2), lookups)) << "what is near stays";
+}
+
+TEST_F(SmallBrickMap, TakesNoNewSpaceWhenAllItHasIsNear) {
+  const std::array<Vector3, 1> here{at_};
+  (void)sut_->integrate({scene_.look(at_), 0, kInfinity, here}, unlimited_, result_);
+  EXPECT_GT(sut_->counters().bricks_refused, 0U);
+  EXPECT_EQ(sut_->counters().bricks_given_up, 0U) << "nothing that this scan needs";
+  core::Work work;
+  (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
+  std::uint64_t lookups = 0;
+  EXPECT_TRUE(sut_->view().is_free(Aabb::around(at_, 0.5), lookups));
+  EXPECT_EQ(sut_->view().at(Vector3(7, 0, 5), lookups), CellState::kUnknown) << "inside the pillar";
+  for (double x = 0.15; x < 20; x += 0.3) {
+    for (double z = 0.15; z < 10; z += 0.3) {
+      const Vector3 p(x, 0.2, z);
+      if (scene_.occupied(p - Vector3(0.3, 0, 0)) && scene_.occupied(p + Vector3(0.3, 0, 0))) {
+        EXPECT_NE(sut_->view().at(p, lookups), CellState::kFree) << p.transpose();
+      }
+    }
+  }
 }
 
 TEST_F(BrickMapTest, WorksWithoutTheHeap) {

@@ -1,0 +1,84 @@
+#include "stages/perception/frame_guard.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "core/random/counter_rng.hpp"
+#include "stages/perception/block_sight.hpp"
+#include "stages/perception/depth_pyramid.hpp"
+
+namespace roborun::stages {
+namespace {
+
+constexpr std::size_t kSamples = 64;
+constexpr std::size_t kLeastSurfaces = 8;
+
+/// Of the samples of an image; 0 if too few of them show a surface.
+std::uint64_t print_of(const firmware_if::DepthFrame& frame) noexcept {
+  std::uint64_t hash = 1;
+  std::size_t surfaces = 0;
+  for (std::size_t i = 0; i < kSamples; ++i) {
+    const float depth_m = frame.depth_m[(2 * i + 1) * frame.depth_m.size() / (2 * kSamples)];
+    surfaces += depth_m > 0.0F && depth_m < frame.range_m ? 1U : 0U;
+    hash = core::mix64(hash ^ std::bit_cast<std::uint32_t>(depth_m));
+  }
+  return surfaces < kLeastSurfaces ? 0 : hash;
+}
+
+/// In double, so that no stamp whatever overflows.
+double seconds_between(MonotonicTime from, MonotonicTime to) noexcept {
+  return seconds(to.time_since_epoch()) - seconds(from.time_since_epoch());
+}
+
+}  // namespace
+
+Status check_frame(const PosedDepthFrame& posed) noexcept {
+  const firmware_if::DepthFrame& f = posed.frame;
+  const bool size_ok = f.width >= 8 && f.height >= 8 && f.width <= DepthPyramid::kMaxPixels &&
+                       f.height <= DepthPyramid::kMaxPixels &&
+                       f.depth_m.size() == std::size_t{f.width} * std::size_t{f.height};
+  const bool optics_ok = f.range_m > 0.0F && f.range_m <= kMaxRange_m && f.tan_half_fov_ratio > 0.0F &&
+                         f.tan_half_fov_ratio <= kMaxTanHalfFov;
+  if (!size_ok || !optics_ok || !is_finite(posed.X_WC.p_RT) || !posed.X_WC.R_RT.allFinite())
+    return Status::kInvalidArgument;
+  const double least = posed.is_cloud ? 1.0 : kLeastInformedRatio * static_cast<double>(f.depth_m.size());
+  const auto informed = static_cast<double>(pixel_counts(f.depth_m, f.range_m).informed);
+  return informed >= least ? Status::kOk : Status::kInvalidArgument;
+}
+
+void FrameGuard::begin(std::span<const PosedDepthFrame> scan) noexcept {
+  if (scan.empty()) return;
+  std::array<MonotonicTime, 16> stamp{};
+  const std::size_t count = std::min(scan.size(), stamp.size());
+  for (std::size_t i = 0; i < count; ++i) stamp[i] = scan[i].frame.stamp;
+  std::sort(stamp.begin(), stamp.begin() + static_cast<std::ptrdiff_t>(count));
+  const MonotonicTime middle = stamp[count / 2];
+  scan_too_old_ = any_scan_ && seconds_between(scan_, middle) < -seconds(kStampSpread);
+  any_scan_ = true;
+  scan_ = middle;
+}
+
+bool FrameGuard::frozen(const firmware_if::DepthFrame& frame) noexcept {
+  const std::uint64_t hash = print_of(frame);
+  if (hash == 0) return false;
+  for (Print& print : print_) {
+    if (print.hash != hash) continue;
+    if (print.stamp == frame.stamp) return false;
+    print_[next_] = {hash, frame.stamp};  // remembered for as long as it comes
+    next_ = (next_ + 1) % print_.size();
+    return true;
+  }
+  print_[next_] = {hash, frame.stamp};
+  next_ = (next_ + 1) % print_.size();
+  return false;
+}
+
+Status FrameGuard::check(const PosedDepthFrame& posed) noexcept {
+  const double late_s = seconds_between(scan_, posed.frame.stamp);
+  const bool in_time = !scan_too_old_ && std::fabs(late_s) <= seconds(kStampSpread);
+  if (!in_time || check_frame(posed) != Status::kOk || frozen(posed.frame)) return Status::kInvalidArgument;
+  return Status::kOk;
+}
+
+}  // namespace roborun::stages

@@ -1,0 +1,56 @@
+/// Depth images that must not be believed. Source: failures of depth cameras seen in flight: black, white,
+/// frozen with fresh stamps, half, of the wrong size or of the wrong time. A frame is used whole or not at
+/// all.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "stages/perception/occupancy_map.hpp"
+
+namespace roborun::stages {
+
+/// A half frame has at most half of its pixels; a good one loses some in a hundred.
+inline constexpr double kLeastInformedRatio = 0.6;
+
+/// kOk if a frame may be used at all: 8..512 pixels a side, as many depths as pixels, range in (0,
+/// kMaxRange_m] and field of view in (0, kMaxTanHalfFov], finite pose, and at least kLeastInformedRatio of
+/// the pixels (of a cloud: one) neither NaN nor <= 0. Otherwise kInvalidArgument: black, NaN, half, wrong
+/// size. RT-safe: O(pixels).
+[[nodiscard]] Status check_frame(const PosedDepthFrame& posed) noexcept;
+
+/// check_frame(), and what only the frames before can tell:
+///  - stamps: a frame more than kStampSpread from the middle one of its scan, or a scan that much older than
+///  the
+///    one before it, is refused. (Twice as old in a row is believed: the clock was set.)
+///  - frozen: 64 pixels spread over the image, 8 of them or more showing a surface, that are bit-equal to
+///  those
+///    of a remembered frame of another stamp. Noise makes that impossible. An image without surfaces may
+///    repeat.
+/// White, "nothing within the range" everywhere, is what an open sky looks like: BrickMap refuses it where it
+/// knows of a surface.
+class FrameGuard {
+ public:
+  static constexpr Nanos kStampSpread{250'000'000};
+
+  /// To be called once a scan, before check(). RT-safe: O(frames).
+  void begin(std::span<const PosedDepthFrame> scan) noexcept;
+  /// kOk or kInvalidArgument. The same frame again is no frozen one. RT-safe: O(pixels).
+  [[nodiscard]] Status check(const PosedDepthFrame& posed) noexcept;
+
+ private:
+  struct Print {
+    std::uint64_t hash{};  ///< 0: none.
+    MonotonicTime stamp{};
+  };
+  [[nodiscard]] bool frozen(const firmware_if::DepthFrame& frame) noexcept;
+
+  std::array<Print, 32> print_{};
+  std::size_t next_{0};
+  MonotonicTime scan_{};
+  bool any_scan_{false};
+  bool scan_too_old_{false};
+};
+
+}  // namespace roborun::stages

@@ -1,0 +1,198 @@
+// Each kind of frame that must not be believed, alone, and in the map: refused whole, nothing cleared.
+#include "stages/perception/frame_guard.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+
+#include "stages/perception/brick_map.hpp"
+#include "tests/stages/perception/scene.hpp"
+#include "tests/support/no_alloc_scope.hpp"
+
+namespace roborun::stages {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNothing = std::numeric_limits<float>::infinity();
+
+MonotonicTime at_s(double time_s) { return MonotonicTime{} + from_seconds(time_s); }
+
+/// Six frames of one instant that own their pixels.
+struct Shot {
+  explicit Shot(test::Scene& scene, double time_s, const Vector3& p_W = Vector3(0.1, 0.2, 5.0))
+      : frames(scene.look(p_W)), image(scene.image) {
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      frames[i].frame.stamp = at_s(time_s);
+      frames[i].frame.depth_m = image[i];
+    }
+  }
+  Shot(const Shot&) = delete;
+  Shot& operator=(const Shot&) = delete;
+  std::vector<PosedDepthFrame> frames;
+  std::vector<std::vector<float>> image;
+};
+
+class FrameGuardTest : public ::testing::Test {
+ protected:
+  FrameGuardTest() {
+    scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)}, {Vector3(6, -2, 0), Vector3(8, 2, 12)}};
+  }
+  int refused(const std::vector<PosedDepthFrame>& frames) {
+    sut_.begin(frames);
+    int count = 0;
+    for (const PosedDepthFrame& f : frames) count += sut_.check(f) == Status::kOk ? 0 : 1;
+    return count;
+  }
+  test::Scene scene_;
+  FrameGuard sut_;
+};
+
+TEST_F(FrameGuardTest, TakesAGoodScanAndTheSameScanAgain) {
+  const Shot shot(scene_, 1.0);
+  EXPECT_EQ(refused(shot.frames), 0);
+  EXPECT_EQ(refused(shot.frames), 0);
+}
+
+TEST_F(FrameGuardTest, RefusesAFrozenCameraForAsLongAsItIsFrozen) {
+  Shot first(scene_, 1.0);
+  EXPECT_EQ(refused(first.frames), 0);
+  for (int n = 1; n < 100; ++n) {
+    Shot next(scene_, 1.0 + 0.1 * n, Vector3(0.1 + 0.01 * n, 0.2, 5.0 + 0.01 * n));
+    next.frames[0].frame.depth_m = first.image[0];
+    ASSERT_EQ(refused(next.frames), 1) << n;
+  }
+  const Shot again(scene_, 12.0, Vector3(0.1, 0.25, 5.2));
+  EXPECT_EQ(refused(again.frames), 0) << "and no longer";
+}
+
+TEST_F(FrameGuardTest, AnOpenSkyMayRepeat) {
+  for (int n = 0; n < 5; ++n) {
+    Shot shot(scene_, 1.0 + n, Vector3(0.1 + 0.01 * n, 0.2, 5.0 + 0.01 * n));
+    shot.image[4].assign(shot.image[4].size(), kNothing);
+    EXPECT_EQ(refused(shot.frames), 0) << n;
+  }
+}
+
+TEST_F(FrameGuardTest, RefusesFramesOfAnotherTime) {
+  Shot shot(scene_, 10.0);
+  shot.frames[2].frame.stamp = at_s(9.7);
+  shot.frames[5].frame.stamp = at_s(1e9);
+  EXPECT_EQ(refused(shot.frames), 2);
+  shot.frames[5].frame.stamp = MonotonicTime::max();
+  shot.frames[2].frame.stamp = MonotonicTime::min();
+  EXPECT_EQ(refused(shot.frames), 2);
+}
+
+TEST_F(FrameGuardTest, RefusesAScanOlderThanTheOneBeforeOnce) {
+  const Shot now(scene_, 10.0), old(scene_, 5.0, Vector3(0.0, 0.1, 5.1)),
+      older(scene_, 5.1, Vector3(0.0, 0.2, 5.2));
+  EXPECT_EQ(refused(now.frames), 0);
+  EXPECT_EQ(refused(old.frames), 6);
+  EXPECT_EQ(refused(older.frames), 0) << "the clock was set";
+}
+
+TEST_F(FrameGuardTest, DoesNotAllocate) {
+  const Shot shot(scene_, 1.0);
+  const test::NoAllocScope scope;
+  EXPECT_EQ(refused(shot.frames), 0);
+  EXPECT_EQ(scope.count(), 0U);
+}
+
+struct Fault {
+  const char* name;
+  std::function<void(Shot&, std::size_t)> break_frame;
+};
+
+class BadFrame : public ::testing::TestWithParam<Fault> {
+ protected:
+  BadFrame() : block_(64U << 20U), arena_(block_) {
+    BrickMap::Config config;
+    config.bounds_W = {Vector3(-30, -30, -3), Vector3(30, 30, 12)};
+    config.max_bricks = 2000;
+    config.max_image_side = 64;
+    sut_ = std::make_unique<BrickMap>(config, arena_);
+    scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)}, {Vector3(6, -2, 0), Vector3(8, 2, 12)}};
+  }
+  Status see(const Shot& shot) {
+    const std::array<Vector3, 1> here{Vector3(0.1, 0.2, 5.0)};
+    return sut_->integrate({shot.frames, 0, 1e18, here}, unlimited_, result_);
+  }
+  std::vector<std::byte> block_;
+  core::Arena arena_;
+  std::unique_ptr<BrickMap> sut_;
+  test::Scene scene_;
+  core::UnlimitedBudget unlimited_;
+  IntegrationResult result_;
+};
+
+/// The camera that looks at the pillar and the ground goes bad for 20 scans while the world behind it is
+/// empty.
+TEST_P(BadFrame, IsRefusedWholeAndClearsNothing) {
+  ASSERT_EQ(see(Shot(scene_, 1.0)), Status::kOk);
+  const auto occupied = [this] {
+    core::Work work;
+    (void)sut_->export_view({0, 1e18, Vector3(0.1, 0.2, 5.0)}, unlimited_, work);
+    std::uint64_t lookups = 0;
+    int count = 0;
+    for (double y = -1.95; y < 2; y += 0.3)
+      for (double z = 0.45; z < 9; z += 0.3)
+        for (const double x : {5.85, 6.15})
+          count += sut_->view().at(Vector3(x, y, z), lookups) == CellState::kOccupied ? 1 : 0;
+    return count;
+  };
+  const int before = occupied();
+  ASSERT_GT(before, 200);
+  for (int n = 1; n <= 20; ++n) {
+    // The cameras tremble, as they do, and noise is never the same twice.
+    Shot shot(scene_, 1.0 + 0.1 * n, Vector3(0.1, 0.2, 5.0 + 0.001 * n));
+    GetParam().break_frame(shot, 0);
+    ASSERT_EQ(see(shot), Status::kOk) << "the other cameras go on";
+    ASSERT_EQ(result_.frames_refused, 1U) << n;
+  }
+  EXPECT_EQ(occupied(), before);
+}
+
+/// All of them: then nothing at all may change.
+TEST_P(BadFrame, AScanOfNothingElseChangesNothing) {
+  const Shot good(scene_, 1.0);
+  ASSERT_EQ(see(good), Status::kOk);
+  const std::uint64_t before = sut_->digest();
+  Shot shot(scene_, 1.1, Vector3(0.1, 0.2, 5.01));
+  shot.frames.erase(shot.frames.begin() + 1, shot.frames.end());
+  GetParam().break_frame(shot, 0);
+  EXPECT_EQ(see(shot), Status::kInvalidArgument);
+  EXPECT_EQ(sut_->digest(), before);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Kinds, BadFrame,
+    ::testing::Values(
+        Fault{"Black", [](Shot& s, std::size_t i) { s.image[i].assign(s.image[i].size(), 0.0F); }},
+        Fault{"White", [](Shot& s, std::size_t i) { s.image[i].assign(s.image[i].size(), kNothing); }},
+        Fault{"Nan", [](Shot& s, std::size_t i) { s.image[i].assign(s.image[i].size(), kNan); }},
+        Fault{"Half",
+              [](Shot& s, std::size_t i) {
+                std::fill(s.image[i].begin() + static_cast<std::ptrdiff_t>(s.image[i].size() / 2),
+                          s.image[i].end(), 0.0F);
+              }},
+        Fault{"WrongSize",
+              [](Shot& s, std::size_t i) {
+                s.frames[i].frame.depth_m = s.frames[i].frame.depth_m.first(64 * 63);
+              }},
+        Fault{"WrongPose",
+              [](Shot& s, std::size_t i) {
+                s.frames[i].X_WC.p_RT.y() = std::numeric_limits<double>::quiet_NaN();
+              }},
+        Fault{"Frozen",
+              [](Shot& s, std::size_t i) {
+                test::Scene scene;
+                scene.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)},
+                               {Vector3(6, -2, 0), Vector3(8, 2, 12)}};
+                const Shot first(scene, 1.0);
+                std::copy(first.image[i].begin(), first.image[i].end(), s.image[i].begin());
+              }}),
+    [](const auto& instance) { return std::string(instance.param.name); });
+
+}  // namespace
+}  // namespace roborun::stages
