@@ -74,9 +74,9 @@ double ActuatorLink::break_esc(std::size_t i, double ratio, MonotonicTime now) n
     case FaultKind::kOff:
       return 0.0;
     case FaultKind::kStuck:
-      return turning_[i];
+      return ratio > 0.0 ? turning_[i] : 0.0;  // until it is told zero
     case FaultKind::kGarbage:
-      return core::CounterRng(ticks, i).uniform();
+      return ratio > 0.0 ? core::CounterRng(ticks, i).uniform() : 0.0;
     case FaultKind::kWrong:
       return 0.85 * ratio;
     case FaultKind::kSlow:

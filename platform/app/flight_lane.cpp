@@ -4,20 +4,30 @@
 
 #include "core/executive/frame_table.hpp"
 #include "core/geometry/math.hpp"
-#include "stages/planning/smoother.hpp"
 
 namespace roborun::app {
 namespace {
 
-constexpr Nanos kSettle{1'000'000'000};  // the filter's biases need a second on the ground
-constexpr Nanos kHover{300'000'000};     // at the top, before the first decision
-constexpr double kBrake_mps2 = 2.5;      // with the path's own 4 m/s2 still within the tilt limit
+constexpr Nanos kSettle{1'000'000'000};     // the filter's biases need a second on the ground
+constexpr Nanos kHover{300'000'000};        // at the top, before the first decision
+constexpr double kGyroRange_radps = 35.0;   // 2,000 degrees a second
+constexpr double kAccelRange_mps2 = 157.0;  // 16 g
+constexpr double kBrake_mps2 = 2.5;         // with the path's own 4 m/s2 still within the tilt limit
 constexpr double kStand_m = 0.5;
 constexpr double kStand_mps = 0.3;
-constexpr double kNearGround_m = 1.0;  // over the take-off's height: from there on slowly
+constexpr double kNearGround_m = 1.5;  // over the take-off's height: from there on slowly
 constexpr double kTouchdown_mps = 0.5;
-constexpr double kBelowGround_m = 2.0;  // the reference goes on until the vehicle stands on something
+constexpr double kBelowGround_m = 20.0;  // the reference goes on until the vehicle stands on something
 constexpr Nanos kLanded{1'000'000'000};
+
+/// Within the range of the sensor; false for NaN.
+bool is_plausible(const firmware_if::ImuSample& sample) {
+  const auto within = [](const std::array<double, 3>& v, double limit) {
+    return std::all_of(v.begin(), v.end(), [limit](double x) { return std::fabs(x) <= limit; });
+  };
+  return within(sample.angular_rate_B_radps, kGyroRange_radps) &&
+         within(sample.specific_force_B_mps2, kAccelRange_mps2);
+}
 
 }  // namespace
 
@@ -30,7 +40,7 @@ void FlightLane::sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_
                       sample.specific_force_B_mps2 == imu_.specific_force_B_mps2;
     imu_repeats_ = same ? std::min(imu_repeats_ + 1, kMostRepeats) : 0;
     imu_ = sample;
-    (void)estimator_.predict(sample);
+    if (is_plausible(sample)) (void)estimator_.predict(sample);
   }
   firmware_if::GnssFix fix;
   for (int i = 0; i < kMost && gnss.read(fix) == Status::kOk; ++i) {
@@ -85,12 +95,21 @@ bool FlightLane::standing(MonotonicTime now) const {
 void FlightLane::descend(MonotonicTime now, double speed_mps) {
   if (descending_ || !flying_) return;
   const Vector3 from_W = committed_.at(now).p_W;
-  const Vector3 low_W(from_W.x(), from_W.y(), std::min(from_W.z() - 0.1, ground_m_ + kNearGround_m));
+  const double fast_m = std::max(from_W.z() - ground_m_ - kNearGround_m, 0.0);
+  const auto straight_down = [](const Vector3& at_W, double length_m, double rate_mps) {
+    PolynomialSegment segment;
+    segment.duration_s = length_m / rate_mps;
+    segment.coefficient[0] = at_W;
+    segment.coefficient[1] = Vector3(0.0, 0.0, -rate_mps);
+    return segment;
+  };
   Trajectory down;
   down.start_time = now;
-  (void)stages::append_rest_to_rest(from_W, low_W, {speed_mps, speed_mps}, down);
-  (void)stages::append_rest_to_rest(low_W, low_W - Vector3(0.0, 0.0, kNearGround_m + kBelowGround_m),
-                                    {kTouchdown_mps, kTouchdown_mps}, down);
+  down.segment_count = 2;
+  down.segment[0] = straight_down(from_W, fast_m, speed_mps);
+  down.segment[1] =
+      straight_down(from_W - Vector3(0.0, 0.0, fast_m), kNearGround_m + kBelowGround_m, kTouchdown_mps);
+  down.brake_begin_s = down.duration_s();
   committed_ = down;
   braking_ = false;
   descending_ = true;

@@ -24,9 +24,10 @@ constexpr double kHome_m = 1.0;
 constexpr double kAtSite_m = 0.7;
 constexpr double kDescent_mps = 1.0;
 constexpr double kBlindDescent_mps = 0.5;
-constexpr Nanos kSitePatience{10'000'000'000};   // until it comes down blindly ...
-constexpr Nanos kStandPatience{20'000'000'000};  // ... also if it cannot stand still
-constexpr Nanos kIdlePeriod{100'000'000};        // of reports while there is nothing to decide
+constexpr Nanos kSitePatience{10'000'000'000};         // until it comes down blindly ...
+constexpr Nanos kStandPatience{20'000'000'000};        // ... also if it cannot stand still
+constexpr Nanos kReportDelay = 4 * core::kMinorFrame;  // at most, from a commit to its report
+constexpr Nanos kIdlePeriod{100'000'000};              // of reports while there is nothing to decide
 
 }  // namespace
 
@@ -68,14 +69,13 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
 void FlightProgram::take_offers(MonotonicTime now, const core::LaneExecutive& lane) noexcept {
   if (!mail_.offer.take()) return;
   const Offer& offer = mail_.offer.read();
-  if (!offer.is_stop && lane.reactions().braking()) {
-    ++offers_refused_;
-    return;
-  }
-  // The stop of a failsafe is the vehicle's own, and what was planned for the flight before it does not fit.
   const MonotonicTime start = std::max(offer.trajectory.start_time, now);
   const bool fits = (flight_.committed().at(start).p_W - offer.trajectory.at(start).p_W).norm() < kSeam_m;
-  if (action_ == Action::kGoOn || (action_ != Action::kHold && fits)) flight_.offer(offer.trajectory);
+  const bool braking = action_ == Action::kHold || (lane.reactions().braking() && !offer.is_stop);
+  if (fits && !braking)
+    flight_.offer(offer.trajectory);
+  else
+    ++offers_refused_;
 }
 
 FailsafeMeasures FlightProgram::measure(MonotonicTime now) noexcept {
@@ -237,13 +237,20 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
   }
   in_.now = lane.release();
   in_.frames = {frames_.begin(), frames_.size()};
-  in_.committed = &report.committed;
+  in_.committed = &flown(lane.release());
   in_.p_WB = state.p_WB;
   in_.v_WB = state.v_WB;
   in_.goal_W = report.action == Action::kReturn ? report.home_W
                : report.action == Action::kLand ? state.p_WB  // close looks, slow
                                                 : config_.goal_W;
   in_.seed = core::mix64(config_.seed * 1000003ULL + ++decisions_);
+}
+
+const Trajectory& DecisionProgram::flown(MonotonicTime now) const noexcept {
+  const Trajectory& reported = mail_.report.read().committed;
+  const bool newer = handed_over_.start_time > reported.start_time && handed_over_.start_time <= now &&
+                     now - handed_over_.start_time <= kReportDelay;
+  return newer ? handed_over_ : reported;
 }
 
 void DecisionProgram::hand_over(const core::LaneExecutive& lane) noexcept {
@@ -253,6 +260,7 @@ void DecisionProgram::hand_over(const core::LaneExecutive& lane) noexcept {
     ++too_late_;
     return;
   }
+  handed_over_ = out_.trajectory;
   mail_.offer.draft() = {out_.trajectory, out_.kind == DecisionKind::kBrake};
   mail_.offer.publish();
 }

@@ -74,7 +74,8 @@ class FlightProgram final : public core::LaneProgram {
   }
   /// A frame belongs to the instant of its release, however late it begins.
   void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override;
-  /// Offers refused because an overrun has the vehicle brake; never decreases.
+  /// Offers refused because an overrun or the failsafe has the vehicle brake, or because they begin elsewhere
+  /// than the committed trajectory will be; never decreases.
   [[nodiscard]] std::uint64_t offers_refused() const noexcept { return offers_refused_; }
 
   [[nodiscard]] governor::Phase phase() const noexcept { return phase_; }
@@ -141,6 +142,9 @@ class DecisionProgram final : public core::LaneProgram {
   void choose_site() noexcept;
   void judge() noexcept;
   void hand_over(const core::LaneExecutive& lane) noexcept;
+  /// What the flight lane flies at `now`. What was handed over counts from its start on: the report of that
+  /// very frame may not be there yet.
+  [[nodiscard]] const Trajectory& flown(MonotonicTime now) const noexcept;
 
   Config config_;
   DecisionPipeline& pipeline_;
@@ -152,6 +156,7 @@ class DecisionProgram final : public core::LaneProgram {
   std::uint64_t decisions_{0};
   std::uint64_t too_late_{0};
   std::atomic<bool> given_up_{false};
+  Trajectory handed_over_{};
   DecisionReport report_{};
   std::array<MonotonicTime, 8> last_usable_{};  ///< By camera.
   std::array<std::uint64_t, 8> image_digest_{};

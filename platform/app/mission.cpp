@@ -139,7 +139,7 @@ void MissionRun::step_lanes() {
   if (cpu == sitl::FaultKind::kOff)
     aircraft_.fly_to(now_);  // the world does not wait
   else
-    flight_lane_.run_frame();
+    while (flight_lane_.release() <= now_) flight_lane_.run_frame();  // more than one after a stall
   if (cpu == sitl::FaultKind::kOff || cpu == sitl::FaultKind::kStuck) return;
   if (decision_lane_.in_frame() && decision_clock_.now() <= now_) decision_lane_.step();
   if (decision_lane_.in_frame() || decision_lane_.release() > now_) return;

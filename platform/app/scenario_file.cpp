@@ -82,7 +82,8 @@ std::array<const char*, N> names_of() {
 
 void ScenarioReader::read_head(Scenario& s) const {
   const toml::table& head = table("scenario");
-  reader_.allow_keys(head, "[scenario]", {"about", "world", "environment", "seed", "design", "answers"});
+  reader_.allow_keys(head, "[scenario]",
+                     {"about", "world", "environment", "seed", "design", "answers", "cost_factor"});
   s.about = text(reader_.need(head, "about", "[scenario]"), "about");
   const toml::node* world = head.get("world");
   const toml::node* environment = head.get("environment");
@@ -98,6 +99,14 @@ void ScenarioReader::read_head(Scenario& s) const {
   if (const toml::node* node = head.get("design")) {
     constexpr std::array<const char*, 3> kDesigns{"aware", "static", "static-fair"};
     s.config.design = static_cast<governor::Design>(choice(*node, "design", kDesigns));
+  }
+  if (const toml::node* node = head.get("cost_factor")) {
+    const double factor = number(*node, "cost_factor", 0.01, 100.0);
+    for (core::StageCost& cost : s.config.costs.stage) cost = core::slower(cost, factor);
+    for (governor::LatencyModel& model : s.config.model) {
+      for (double& fixed_s : model.fixed_s) fixed_s *= factor;
+      for (double& slope_s_per_m3 : model.slope_s_per_m3) slope_s_per_m3 *= factor;
+    }
   }
   if (const toml::node* node = head.get("answers")) s.config.answers = truth(*node, "answers");
 }

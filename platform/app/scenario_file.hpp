@@ -32,7 +32,8 @@ struct Scenario {
   Expectation expect{};
 };
 
-/// Tables [scenario] about, world (relative to this file) or environment, seed, design, answers; those of a
+/// Tables [scenario] about, world (relative to this file) or environment, seed, design, answers, cost_factor
+/// (of computing, against the paper's machine); those of a
 /// settings file (settings_file.hpp); any number of [[fault]] with component, kind, instance, phase, at_s,
 /// for_s; [expect] with the fields above. Throws sitl::InputError with file, line, key and what would be
 /// right.
