@@ -1,5 +1,7 @@
 #include "platform/app/actuator_link.hpp"
 
+#include <algorithm>
+
 namespace roborun::app {
 namespace {
 
@@ -27,12 +29,68 @@ Status ActuatorLink::command(const firmware_if::MotorCommand& command) noexcept 
   }
   command_ = command;
   commanded_ = true;
-  if (!armed_) armed_ = gate_.arm() == Status::kOk;
+  if (!armed_ && !disarmed_) armed_ = gate_.arm() == Status::kOk;
   return Status::kOk;
 }
 
+void ActuatorLink::disarm() noexcept {
+  gate_.disarm();
+  armed_ = false;
+  disarmed_ = true;
+}
+
+Nanos ActuatorLink::esc_silence(MonotonicTime now) const noexcept {
+  Nanos longest{0};
+  for (std::size_t i = 0; i < escs_.size(); ++i)
+    longest = std::max(longest, now - node_.inbox().esc[i].stamp);
+  return longest;
+}
+
+void ActuatorLink::break_lines(MonotonicTime now) noexcept {
+  using sitl::FaultKind;
+  const FaultKind kill = faults_->of(sitl::Component::kKillSwitch);
+  pulse_ = kill == FaultKind::kIntermittent && !pulse_;
+  kill_open_.drive(kill == FaultKind::kOn || kill == FaultKind::kStuck || pulse_, now);
+  kill_closed_.drive(kill != FaultKind::kOn && !pulse_, now);
+  if (kill == FaultKind::kOff) kill_closed_.remove();
+
+  const FaultKind can = faults_->of(sitl::Component::kCan);
+  if (bus_off_ != (can == FaultKind::kOff)) {
+    bus_off_ = !bus_off_;
+    bus_off_ ? port_.go_bus_off() : port_.recover();
+  }
+  bus_.set_faults({.loss_ratio = can == FaultKind::kIntermittent ? 0.5 : 0.0,
+                   .corrupt_ratio = can == FaultKind::kGarbage ? 0.5 : 0.0});
+}
+
+double ActuatorLink::break_esc(std::size_t i, double ratio, MonotonicTime now) noexcept {
+  using sitl::FaultKind;
+  const int instance = static_cast<int>(i);
+  const FaultKind kind = faults_->of(sitl::Component::kEsc, instance);
+  escs_[i].set_silent(kind == FaultKind::kOff ||
+                      faults_->of(sitl::Component::kEscStatus, instance) == FaultKind::kOff);
+  const auto ticks = static_cast<std::uint64_t>(now.time_since_epoch() / Nanos{50'000'000});
+  switch (kind) {
+    case FaultKind::kOff:
+      return 0.0;
+    case FaultKind::kStuck:
+      return ratio > 0.0 ? turning_[i] : 0.0;  // until it is told zero
+    case FaultKind::kGarbage:
+      return ratio > 0.0 ? core::CounterRng(ticks, i).uniform() : 0.0;
+    case FaultKind::kWrong:
+      return 0.85 * ratio;
+    case FaultKind::kSlow:
+      return turning_[i] + 0.02 * (ratio - turning_[i]);
+    case FaultKind::kIntermittent:
+      return core::CounterRng(ticks, 8 + i).below(2) == 0 ? 0.0 : ratio;
+    default:
+      return ratio;
+  }
+}
+
 void ActuatorLink::step(MonotonicTime now) noexcept {
-  if (kill_switch_.sample()) gate_.kill();
+  if (faults_ != nullptr) break_lines(now);
+  if (kill_switch_.sample() && !ignores_kill_switch_) gate_.kill();
   // Before take-off nobody commands, and the node still has to say that it is there.
   const bool alive = commanded_ || !armed_;
   if (alive) gate_.beat(now);
@@ -43,13 +101,12 @@ void ActuatorLink::step(MonotonicTime now) noexcept {
 void ActuatorLink::advance(MonotonicTime now, firmware_if::Motors& motors) noexcept {
   bus_.advance(now);
   firmware_if::MotorCommand out;
-  for (std::size_t i = 0; i < escs_.size(); ++i) out.thrust_ratio[i] = escs_[i].step(now);
+  for (std::size_t i = 0; i < escs_.size(); ++i) {
+    out.thrust_ratio[i] = escs_[i].step(now);
+    if (faults_ != nullptr) out.thrust_ratio[i] = break_esc(i, out.thrust_ratio[i], now);
+  }
+  turning_ = out.thrust_ratio;
   (void)motors.command(out);
-}
-
-void ActuatorLink::press_kill_switch(MonotonicTime now) noexcept {
-  kill_open_.drive(true, now);
-  kill_closed_.drive(false, now);
 }
 
 }  // namespace roborun::app

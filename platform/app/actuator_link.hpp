@@ -10,6 +10,7 @@
 #include "platform/sitl/bus/fake_can.hpp"
 #include "platform/sitl/bus/fake_esc.hpp"
 #include "platform/sitl/bus/fake_gpio.hpp"
+#include "platform/sitl/fault/fault_line.hpp"
 
 namespace roborun::app {
 
@@ -28,12 +29,28 @@ class ActuatorLink final : public firmware_if::Motors {
   /// Runs the bus until `now`; the ESCs hand their throttle to `motors`.
   void advance(MonotonicTime now, firmware_if::Motors& motors) noexcept;
 
-  void press_kill_switch(MonotonicTime now) noexcept;
+  /// Faults of ESCs, bus and kill switch; null: none. It must outlive the link.
+  void connect(const sitl::FaultLine* faults) noexcept { faults_ = faults; }
+  /// A twin for tests: the kill switch has no effect.
+  void ignore_kill_switch() noexcept { ignores_kill_switch_ = true; }
+  [[nodiscard]] bool killed() const noexcept { return kill_switch_.killed(); }
+  /// Motors off for good, by the runtime itself.
+  void terminate() noexcept { gate_.kill(); }
+  /// After a landing: zeros, and no arming by a later command.
+  void disarm() noexcept;
+  /// Throttle that the motors were given last, 0 .. 1.
+  [[nodiscard]] const std::array<double, 4>& throttle() const noexcept { return turning_; }
+  /// How long the most silent ESC has not been heard.
+  [[nodiscard]] Nanos esc_silence(MonotonicTime now) const noexcept;
+
   [[nodiscard]] const firmware_if::dronecan::Node& node() const noexcept { return node_; }
   [[nodiscard]] const firmware_if::TransmitGate& gate() const noexcept { return gate_; }
   [[nodiscard]] const sitl::FakeCan& bus() const noexcept { return bus_; }
 
  private:
+  void break_lines(MonotonicTime now) noexcept;
+  [[nodiscard]] double break_esc(std::size_t i, double ratio, MonotonicTime now) noexcept;
+
   sitl::FakeCan bus_;
   sitl::FakeCanPort& port_;
   firmware_if::TransmitGate gate_;
@@ -46,6 +63,12 @@ class ActuatorLink final : public firmware_if::Motors {
   firmware_if::MotorCommand command_{};
   bool commanded_{false};  ///< This minor frame: the control cycle is alive.
   bool armed_{false};
+  bool disarmed_{false};  ///< For good.
+  bool ignores_kill_switch_{false};
+  const sitl::FaultLine* faults_{nullptr};
+  bool bus_off_{false};
+  bool pulse_{false};
+  std::array<double, 4> turning_{};  ///< What the motors were given last.
 };
 
 }  // namespace roborun::app

@@ -5,6 +5,7 @@
 
 #include "core/executive/frame_table.hpp"
 #include "core/memory/static_vector.hpp"
+#include "stages/planning/fenced_view.hpp"
 
 namespace roborun::app {
 namespace {
@@ -102,7 +103,8 @@ void DecisionPipeline::export_map(const DecisionInput& in, DecisionOutput& out) 
 }
 
 void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexcept {
-  const stages::MapView& view = map_.view();
+  const stages::FencedView fenced(map_.view(), config_.fence);
+  const stages::MapView& view = config_.fence.empty() ? map_.view() : fenced;
   const OperatingPoint& point = out.decision.point;
   const MonotonicTime takes_over = in.now + point.deadline;
   const TrajectoryPoint start = in.committed->at(takes_over);

@@ -7,6 +7,7 @@
 
 #include "core/executive/stage_budget.hpp"
 #include "core/executive/stage_meter.hpp"
+#include "core/geometry/fence.hpp"
 #include "core/geometry/vector.hpp"
 #include "core/trajectory.hpp"
 #include "governor/policy/governor.hpp"
@@ -25,6 +26,7 @@ struct PipelineConfig {
   double inflation_m{0.3};
   double horizon_m{24.0};  ///< No way-point farther than this: one metre less than the cameras see.
   double acceleration_mps2{4.0};
+  core::Fence fence{};  ///< What it forbids is occupied for planner and smoother.
   Aabb map_bounds_W{};  ///< What the map stores; its heights limit what counts as seen volume.
 };
 
@@ -71,6 +73,10 @@ class DecisionPipeline {
   /// smoother alternates with the planner in the planner's turn, each charged for its own, and has no turn.
   /// RT-safe: no allocation; bounded by the stages' budgets.
   void run(core::StageId id, const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// Of the map, as the planner sees it but for the fence.
+  [[nodiscard]] const stages::MapView& view() const noexcept { return map_.view(); }
+  /// What plans keep free around the vehicle.
+  [[nodiscard]] double radius_m() const noexcept { return config_.vehicle_radius_m + config_.inflation_m; }
 
  private:
   void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
@@ -83,7 +89,6 @@ class DecisionPipeline {
   [[nodiscard]] core::MeteredBudget budget_of(core::StageId id, const DecisionOutput& out) noexcept;
   /// For the stages that the governor does not shape: the frame table's.
   [[nodiscard]] core::MeteredBudget table_budget_of(core::StageId id) noexcept;
-  [[nodiscard]] double radius_m() const noexcept { return config_.vehicle_radius_m + config_.inflation_m; }
 
   PipelineConfig config_;
   core::StageMeter& meter_;

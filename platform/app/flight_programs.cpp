@@ -1,11 +1,35 @@
 #include "platform/app/flight_programs.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 #include "core/geometry/camera_pose.hpp"
+#include "core/geometry/math.hpp"
 #include "core/random/counter_rng.hpp"
+#include "core/record/state_hash.hpp"
+#include "platform/app/landing_site.hpp"
 
 namespace roborun::app {
 
 using core::SlotId;
+using governor::Action;
+using governor::Phase;
+
+namespace {
+
+constexpr double kLostTilt_cos = 0.5;  // 60 degrees
+constexpr double kSeam_m = 0.3;        // between what is flown and what is offered
+constexpr double kHome_m = 1.0;
+constexpr double kAtSite_m = 0.7;
+constexpr double kDescent_mps = 1.0;
+constexpr double kBlindDescent_mps = 0.5;
+constexpr Nanos kSitePatience{10'000'000'000};         // until it comes down blindly ...
+constexpr Nanos kStandPatience{20'000'000'000};        // ... also if it cannot stand still
+constexpr Nanos kReportDelay = 4 * core::kMinorFrame;  // at most, from a commit to its report
+constexpr Nanos kIdlePeriod{100'000'000};              // of reports while there is nothing to decide
+
+}  // namespace
 
 void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
   const MonotonicTime now = lane.release();
@@ -17,13 +41,8 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
       flight_.sense(aircraft_.sensors, aircraft_.sensors, aircraft_.sensors);
       return;
     case SlotId::kCommit:
-      if (mail_.offer.take()) {
-        const Offer& offer = mail_.offer.read();
-        if (offer.is_stop || !lane.reactions().braking())
-          flight_.offer(offer.trajectory);
-        else
-          ++offers_refused_;
-      }
+      guard(now);
+      take_offers(now, lane);
       flight_.commit(now);
       return;
     case SlotId::kTrack:
@@ -35,6 +54,10 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
       report.estimator = flight_.estimator();
       report.committed = flight_.committed();
       report.airborne = flight_.airborne();
+      report.action = action_;
+      report.standing = flight_.standing(now);
+      report.home_W = flight_.home_W();
+      report.ground_m = flight_.ground_m();
       mail_.report.publish();
       return;
     }
@@ -43,25 +66,170 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
   }
 }
 
+void FlightProgram::take_offers(MonotonicTime now, const core::LaneExecutive& lane) noexcept {
+  if (!mail_.offer.take()) return;
+  const Offer& offer = mail_.offer.read();
+  const MonotonicTime start = std::max(offer.trajectory.start_time, now);
+  const bool fits = (flight_.committed().at(start).p_W - offer.trajectory.at(start).p_W).norm() < kSeam_m;
+  const bool braking = action_ == Action::kHold || (lane.reactions().braking() && !offer.is_stop);
+  if (fits && !braking)
+    flight_.offer(offer.trajectory);
+  else
+    ++offers_refused_;
+}
+
+FailsafeMeasures FlightProgram::measure(MonotonicTime now) noexcept {
+  FailsafeMeasures m;
+  m.battery_used_ratio = 1.0 - aircraft_.battery_ratio();
+  m.gnss_age_s = seconds(now - flight_.last_fix());
+  m.esc_silence_s = seconds(aircraft_.actuators.esc_silence(now));
+  if (aircraft_.hears_operator()) operator_heard_ = now;
+  m.link_silence_s = seconds(now - operator_heard_);
+  m.killed = aircraft_.actuators.killed() ? 1.0 : 0.0;
+  if (const DecisionReport& d = mail_.decision.read(); d.heard) {
+    m.depth_age_s = d.depth_age_s;
+    m.planner_failures = d.failures;
+    m.decision_late_s = seconds(now - d.due);
+    m.map_refusals = d.map_refusals;
+  }
+  stages::EstimatedState state;
+  if (flight_.estimator().state(state) != Status::kOk) return m;
+  const bool tilted = state.q_WB.toRotationMatrix()(2, 2) < kLostTilt_cos;
+  m.control_lost = tilted || flight_.imu_lost(now) ? 1.0 : 0.0;
+  if (flight_.flying()) m.tracking_error_m = (state.p_WB - flight_.reference().p_W).norm();
+  // Heights only between climb and descent: both go through the floor.
+  const bool low = !flight_.airborne() || flight_.descending();
+  const bool inside =
+      low ? config_.fence.allows_over_ground({state.p_WB, state.p_WB}) : config_.fence.allows(state.p_WB);
+  m.outside_fence = inside ? 0.0 : 1.0;
+  return m;
+}
+
+void FlightProgram::guard(MonotonicTime now) noexcept {
+  (void)mail_.decision.take();
+  if (phase_ == Phase::kGround && flight_.flying()) phase_ = Phase::kTakeOff;
+  if (phase_ == Phase::kTakeOff && flight_.airborne()) phase_ = Phase::kMission;
+  if (flight_.landed()) return aircraft_.actuators.disarm();
+  FailsafeMeasures measures = measure(now);
+  if (flight_.descending()) measures.tracking_error_m = 0.0;  // the ground stops it, and is meant to
+  conditions_ = monitor_.step(now, measures);
+  const Action wanted = governor::arbitrate(conditions_, phase_);
+  if (!config_.answers) return;
+  if (wanted != action_) {
+    begin(wanted, now);
+    (void)events_.push_back({now, wanted, conditions_, phase_});
+  }
+  phase_ = governor::phase_after(action_, phase_);
+  if (action_ == Action::kReturn) come_home(now);
+  if (action_ == Action::kLand) land(now);
+}
+
+void FlightProgram::begin(Action action, MonotonicTime now) noexcept {
+  action_ = action;
+  flight_.allow_take_off(action == Action::kGoOn);
+  if (action == Action::kHold || action == Action::kLand) flight_.brake();
+  if (action == Action::kTerminate) aircraft_.actuators.terminate();
+  action_since_ = now;
+}
+
+void FlightProgram::come_home(MonotonicTime now) noexcept {
+  const Vector3 away = flight_.reference().p_W - flight_.home_W();
+  if (away.norm() > kHome_m || !flight_.standing(now)) return;
+  begin(Action::kLand, now);
+  (void)events_.push_back({now, Action::kLand, conditions_, phase_});
+  phase_ = Phase::kLand;
+}
+
+void FlightProgram::land(MonotonicTime now) noexcept {
+  constexpr governor::ConditionSet kNoAdvice = governor::kReturnNeeds;  // nobody looks for a place then
+  if (phase_ == Phase::kGround || flight_.descending()) return;
+  const bool standing = flight_.standing(now);
+  const DecisionReport& d = mail_.decision.read();
+  if (standing && d.heard && d.site_known) {
+    const Vector3 away = flight_.reference().p_W - d.site_W;
+    if (core::hypot2(away.x(), away.y()) < kAtSite_m) {
+      site_was_known_ = true;
+      flight_.descend(now, kDescent_mps);
+      return;
+    }
+  }
+  const bool advised = (conditions_ & kNoAdvice) == 0;
+  const Nanos patience = !standing ? kStandPatience : advised ? kSitePatience : Nanos{0};
+  if (now - action_since_ < patience) return;
+  flight_.descend(now, kBlindDescent_mps);
+}
+
+bool DecisionProgram::is_usable(std::size_t camera, const firmware_if::DepthFrame& frame) noexcept {
+  constexpr int kEnough = 16;
+  core::StateHash hash;
+  std::size_t surfaces = 0;
+  std::size_t valid = 0;
+  for (const float depth_m : frame.depth_m) {
+    if (!(depth_m > 0.0F)) continue;
+    ++valid;
+    if (!std::isfinite(depth_m)) continue;
+    ++surfaces;
+    hash.add(static_cast<double>(depth_m));
+  }
+  // The open sky is the same in every image.
+  const bool stuck = surfaces >= kEnough && hash.value() == image_digest_[camera];
+  image_digest_[camera] = hash.value();
+  return !stuck && 5 * valid >= frame.depth_m.size();
+}
+
+void DecisionProgram::publish(MonotonicTime due) noexcept {
+  report_.heard = true;
+  report_.due = due;
+  mail_.decision.draft() = report_;
+  mail_.decision.publish();
+}
+
+void DecisionProgram::choose_site() noexcept {
+  const FlightReport& report = mail_.report.read();
+  if (report.action != Action::kLand || !report.standing || report_.site_known) return;
+  const auto site_W =
+      landing_site_W(pipeline_.view(), config_.fence, in_.p_WB, report.ground_m, pipeline_.radius_m());
+  report_.site_known = site_W.has_value();
+  if (site_W) report_.site_W = *site_W;
+}
+
+void DecisionProgram::judge() noexcept {
+  const bool answer = out_.planner_status == Status::kNoPath || out_.planner_status == Status::kGoalBlocked;
+  // On the way home even "no way" is a failure: nothing else will bring it down.
+  const bool fine = out_.kind == DecisionKind::kNew || report_.site_known ||
+                    (answer && mail_.report.read().action != Action::kReturn);
+  report_.failures = fine ? 0 : report_.failures + 1;
+  if (config_.map_refusals == nullptr) return;
+  report_.map_refusals = *config_.map_refusals > refusals_before_ ? report_.map_refusals + 1 : 0;
+  refusals_before_ = *config_.map_refusals;
+}
+
 void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
   (void)mail_.report.take();
   const FlightReport& report = mail_.report.read();
   stages::EstimatedState state;
   if (given_up_.load(std::memory_order_acquire) || !report.airborne ||
       report.estimator.state(state) != Status::kOk) {
+    // Nobody waits for it: decisions have not begun, or are over.
+    last_usable_.fill(lane.release());
+    publish(lane.release() + kIdlePeriod);
     lane.end_frame();
     return;
   }
   frames_.clear();
-  for (firmware_if::DepthCamera* camera : cameras_) {
+  report_.depth_age_s = 0.0;
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
     stages::PosedDepthFrame posed;
     Pose X_WB;
-    if (camera->read(posed.frame) != Status::kOk ||
-        report.estimator.pose_at(posed.frame.stamp, X_WB) != Status::kOk)
-      continue;
-    posed.X_WC = core::camera_pose(X_WB, camera->mount());
-    (void)frames_.push_back(posed);
+    if (cameras_[i]->read(posed.frame) == Status::kOk && is_usable(i, posed.frame) &&
+        report.estimator.pose_at(posed.frame.stamp, X_WB) == Status::kOk) {
+      posed.X_WC = core::camera_pose(X_WB, cameras_[i]->mount());
+      (void)frames_.push_back(posed);
+      last_usable_[i] = posed.frame.stamp;
+    }
+    report_.depth_age_s = std::max(report_.depth_age_s, seconds(lane.release() - last_usable_[i]));
   }
+  publish(lane.release() + kIdlePeriod);
   if (frames_.empty()) {
     lane.set_period(4 * core::kMinorFrame);
     lane.end_frame();
@@ -69,11 +237,20 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
   }
   in_.now = lane.release();
   in_.frames = {frames_.begin(), frames_.size()};
-  in_.committed = &report.committed;
+  in_.committed = &flown(lane.release());
   in_.p_WB = state.p_WB;
   in_.v_WB = state.v_WB;
-  in_.goal_W = config_.goal_W;
+  in_.goal_W = report.action == Action::kReturn ? report.home_W
+               : report.action == Action::kLand ? state.p_WB  // close looks, slow
+                                                : config_.goal_W;
   in_.seed = core::mix64(config_.seed * 1000003ULL + ++decisions_);
+}
+
+const Trajectory& DecisionProgram::flown(MonotonicTime now) const noexcept {
+  const Trajectory& reported = mail_.report.read().committed;
+  const bool newer = handed_over_.start_time > reported.start_time && handed_over_.start_time <= now &&
+                     now - handed_over_.start_time <= kReportDelay;
+  return newer ? handed_over_ : reported;
 }
 
 void DecisionProgram::hand_over(const core::LaneExecutive& lane) noexcept {
@@ -83,6 +260,7 @@ void DecisionProgram::hand_over(const core::LaneExecutive& lane) noexcept {
     ++too_late_;
     return;
   }
+  handed_over_ = out_.trajectory;
   mail_.offer.draft() = {out_.trajectory, out_.kind == DecisionKind::kBrake};
   mail_.offer.publish();
 }
@@ -92,7 +270,14 @@ void DecisionProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
   if (slot == SlotId::kHandOver) return hand_over(lane);
   const auto stage =
       static_cast<core::StageId>(static_cast<int>(slot) - static_cast<int>(SlotId::kPointCloud));
+  if (slot == SlotId::kPlanner) {
+    choose_site();
+    if (report_.site_known) in_.goal_W = report_.site_W;
+  }
   pipeline_.run(stage, in_, out_);
+  if (slot == SlotId::kPlanner) judge();
+  if (slot == SlotId::kGovernor || slot == SlotId::kPlanner)
+    publish(lane.release() + out_.decision.point.deadline);
   if (slot == SlotId::kGovernor) lane.set_period(out_.decision.point.deadline);
 }
 

@@ -1,8 +1,12 @@
 #include "platform/app/flight_system.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <limits>
 
 #include "platform/sitl/world/input_error.hpp"
+#include "stages/perception/brick_map.hpp"
 
 namespace roborun::app {
 namespace {
@@ -18,6 +22,27 @@ Trajectory take_off(const Vector3& ground_W, const Vector3& top_W, MonotonicTime
   return t;
 }
 
+/// Gives no answer while its fault lasts.
+class FaultyPlanner final : public stages::Planner {
+ public:
+  FaultyPlanner(std::unique_ptr<stages::Planner> planner, const SimulatedAircraft& aircraft)
+      : planner_(std::move(planner)), aircraft_(aircraft) {}
+  [[nodiscard]] Status plan(const stages::PlanRequest& request, const stages::MapView& view,
+                            core::StageBudget& budget, stages::PlanResult& result) noexcept override {
+    const sitl::FaultKind kind = aircraft_.faults != nullptr ? aircraft_.faults->of(sitl::Component::kPlanner)
+                                                             : sitl::FaultKind::kNone;
+    const bool silent =
+        kind == sitl::FaultKind::kOff || (kind == sitl::FaultKind::kIntermittent && request.seed % 2 == 0);
+    if (!silent) return planner_->plan(request, view, budget, result);
+    result = {};
+    return Status::kBudgetSpent;
+  }
+
+ private:
+  std::unique_ptr<stages::Planner> planner_;
+  const SimulatedAircraft& aircraft_;
+};
+
 }  // namespace
 
 FlightSystem::FlightSystem(const sitl::World& world, const MissionConfig& config, core::StageMeter& meter,
@@ -29,13 +54,23 @@ FlightSystem::FlightSystem(const sitl::World& world, const MissionConfig& config
   pipeline.map_bounds_W = {world.bounds_W().min_W - Vector3::Constant(kMapMargin_m),
                            world.bounds_W().max_W + Vector3::Constant(kMapMargin_m)};
   pipeline.horizon_m = config.camera.range_m - 1.0;
+  pipeline.fence = config.fence;
 
+  for (const auto& [name, p_W] : {std::pair{"start", world.start_W()}, std::pair{"goal", world.goal_W()}}) {
+    const double room_m = pipeline.vehicle_radius_m + pipeline.inflation_m;
+    if (!config.fence.allows(Aabb::around(p_W, room_m)))
+      throw sitl::InputError(
+          fmt::format("fence: the {} ({:.2f}, {:.2f}, {:.2f}) must be inside, with {} m to spare", name,
+                      p_W.x(), p_W.y(), p_W.z(), room_m));
+  }
   const std::size_t cloud_bytes = stages::PointCloud::arena_bytes({});
   block_.resize(cloud_bytes + backend_bytes(pipeline.map_bounds_W, config.camera) + 4096);
   arena_.emplace(block_);
   cloud_.emplace(stages::PointCloud::Config{}, *arena_);
   backends_ = make_backends(config.map_backend, config.planner_backend, pipeline.map_bounds_W, config.camera,
                             *arena_);
+  if (!config.faults.empty())
+    backends_.planner = std::make_unique<FaultyPlanner>(std::move(backends_.planner), aircraft);
   if (arena_->exhausted()) throw sitl::InputError("memory plan: the arena is too small for this world");
 
   const auto cost_of = [&config](core::StageId id) { return seconds(config.costs.cost(id, {})); };
@@ -57,9 +92,19 @@ FlightSystem::FlightSystem(const sitl::World& world, const MissionConfig& config
   flight_.set_take_off([cruise_m = world.start_W().z()](const Vector3& ground_W, MonotonicTime start) {
     return take_off(ground_W, Vector3(ground_W.x(), ground_W.y(), cruise_m), start);
   });
-  flight_program_.emplace(flight_, aircraft, mail_);
-  decision_program_.emplace(DecisionProgram::Config{world.goal_W(), config.seed}, *pipeline_, cameras_,
-                            mail_);
+  flight_program_.emplace(FlightProgram::Config{config.fence, config.answers}, flight_, aircraft, mail_);
+  const std::uint64_t* refusals = nullptr;
+  if (config.map_backend == "own")  // the stages have no type information to ask
+    refusals = &static_cast<const stages::BrickMap&>(*backends_.map).counters().bricks_refused;
+  decision_program_.emplace(DecisionProgram::Config{world.goal_W(), config.seed, config.fence, refusals},
+                            *pipeline_, cameras_, mail_);
+}
+
+void FlightSystem::refuse_bricks(bool refuse) noexcept {
+  core::PoolRecord* bricks = arena_->find("map bricks");
+  if (bricks == nullptr) return;
+  bricks->fault = refuse ? core::PoolRecord::Fault{0, std::numeric_limits<std::uint64_t>::max()}
+                         : core::PoolRecord::Fault{};
 }
 
 std::vector<report::PoolUse> FlightSystem::pools() const {

@@ -35,6 +35,8 @@ class FlightSystem {
   /// The memory plan, with what was used so far.
   [[nodiscard]] std::vector<report::PoolUse> pools() const;
   [[nodiscard]] const stages::OccupancyMap& map() const noexcept { return *backends_.map; }
+  /// A fault: the own map gets no memory for new bricks.
+  void refuse_bricks(bool refuse) noexcept;
 
  private:
   std::array<firmware_if::DepthCamera*, kCameras> cameras_;

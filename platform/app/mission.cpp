@@ -14,6 +14,7 @@
 #include "core/record/state_hash.hpp"
 #include "platform/app/camera_rig.hpp"
 #include "platform/app/flight_system.hpp"
+#include "platform/sitl/fault/faulty_sensors.hpp"
 
 namespace roborun::app {
 namespace {
@@ -21,6 +22,11 @@ namespace {
 constexpr double kReached_m = 1.0;
 constexpr double kReachedSpeed_mps = 0.5;
 constexpr double kHover_mps = 0.3;
+constexpr double kHolding_s = 5.0;  // of hovering, until a hold counts as the end
+constexpr double kHardTouchdown_mps = 2.0;
+constexpr double kStorm_mps = 18.0;
+constexpr double kSlowCpu = 4.0;
+constexpr double kGiveUpAfter_s = 60.0;  // what cannot even stop
 
 double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0.0;
@@ -36,7 +42,11 @@ class MissionRun {
   report::MissionReport fly(const std::function<void(const Progress&)>& progress);
 
  private:
+  [[nodiscard]] std::array<firmware_if::DepthCamera*, kCameras> cameras();
+  void begin_faults();
   void step_lanes();
+  void watch();
+  [[nodiscard]] const char* failsafe_reason();
   void record_decision(const DecisionOutput& out);
   [[nodiscard]] const char* end_reason();
   void summarise(double wall_s);
@@ -44,9 +54,13 @@ class MissionRun {
   const sitl::World& world_;
   const MissionConfig& config_;
   core::CostProfile costs_;  ///< What computing costs now.
-  bool slowed_{false};
+  double slowed_by_{1.0};
   MonotonicTime now_{};
+  sitl::FaultLine faults_;
+  std::vector<bool> begun_;  ///< By config_.faults.
+  std::array<std::optional<MonotonicTime>, governor::kPhaseCount> phase_begin_{};
   CameraRig rig_;
+  std::vector<sitl::FaultyDepthCamera> faulty_camera_;
   SimulatedAircraft aircraft_;
   core::VirtualClock flight_clock_;
   core::VirtualClock decision_clock_;
@@ -57,6 +71,8 @@ class MissionRun {
   core::LaneExecutive decision_lane_;
 
   const char* give_up_{nullptr};  ///< Why the vehicle stops where it is.
+  bool left_ground_{false};
+  double sink_mps_{0.0};
   double best_distance_m_{1e300};
   MonotonicTime best_at_{};
   core::StateHash hash_;
@@ -68,12 +84,13 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
     : world_(world),
       config_(config),
       costs_(config.costs),
+      begun_(config.faults.size(), false),
       rig_(world, config.camera, config.seed),
       aircraft_{sitl::Vehicle(config.vehicle, config.wind,
                               Vector3(world.start_W().x(), world.start_W().y(), 0.0), config.seed),
                 sitl::NavigationSensors(config.sensors, config.seed), rig_, ActuatorLink(config.seed)},
       meter_(costs_, decision_clock_),
-      system_(world, config, meter_, aircraft_, rig_.cameras()),
+      system_(world, config, meter_, aircraft_, cameras()),
       flight_lane_(core::LaneId::kFlight, flight_clock_, system_.flight_program(), reactions_, nullptr),
       decision_lane_(core::LaneId::kDecision, decision_clock_, system_.decision_program(), reactions_,
                      nullptr) {
@@ -82,18 +99,58 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
   decision_lane_.start(MonotonicTime{core::kMinorFrame});
 }
 
+std::array<firmware_if::DepthCamera*, kCameras> MissionRun::cameras() {
+  std::array<firmware_if::DepthCamera*, kCameras> all = rig_.cameras();
+  if (config_.faults.empty()) return all;
+  aircraft_.connect(faults_);
+  faulty_camera_.reserve(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    faulty_camera_.emplace_back(*all[i], static_cast<int>(i), faults_);
+    all[i] = &faulty_camera_[i];
+  }
+  return all;
+}
+
+void MissionRun::begin_faults() {
+  faults_.advance(now_);
+  const auto phase = static_cast<std::size_t>(system_.flight_program().phase());
+  if (!phase_begin_[phase]) phase_begin_[phase] = now_;
+  for (std::size_t i = 0; i < begun_.size(); ++i) {
+    const TimedFault& f = config_.faults[i];
+    const auto from = f.phase ? phase_begin_[static_cast<std::size_t>(*f.phase)] : MonotonicTime{};
+    if (begun_[i] || !from || seconds(now_ - *from) < f.at_s) continue;
+    begun_[i] = true;
+    faults_.inject(f.fault, from_seconds(f.for_s));
+    if (report_.safety.first_fault_s < 0.0) report_.safety.first_fault_s = seconds(now_.time_since_epoch());
+  }
+  if (begun_.empty()) return;
+  const bool storm = faults_.of(sitl::Component::kWind) == sitl::FaultKind::kOn;
+  aircraft_.vehicle.set_mean_wind(storm ? Vector3(0.0, kStorm_mps, 0.0) : config_.wind.mean_W_mps);
+  system_.refuse_bricks(faults_.of(sitl::Component::kMap) == sitl::FaultKind::kOff);
+}
+
 /// One minor frame of all lanes. A decision is computed at once from the inputs of its start; its last slot,
 /// the hand-over, waits until the board would have been ready.
 void MissionRun::step_lanes() {
   now_ += core::kMinorFrame;
+  begin_faults();
+  const sitl::FaultKind cpu = faults_.of(sitl::Component::kCpu);
   flight_clock_.set(now_);
-  flight_lane_.run_frame();
+  if (cpu == sitl::FaultKind::kOff)
+    aircraft_.fly_to(now_);  // the world does not wait
+  else
+    while (flight_lane_.release() <= now_) flight_lane_.run_frame();  // more than one after a stall
+  if (cpu == sitl::FaultKind::kOff || cpu == sitl::FaultKind::kStuck) return;
   if (decision_lane_.in_frame() && decision_clock_.now() <= now_) decision_lane_.step();
   if (decision_lane_.in_frame() || decision_lane_.release() > now_) return;
   decision_clock_.set(now_);
-  if (!slowed_ && seconds(now_.time_since_epoch()) >= config_.slow_down_at_s) {
-    for (core::StageCost& cost : costs_.stage) cost = core::slower(cost, config_.slow_down_factor);
-    slowed_ = true;
+  const bool slow = seconds(now_.time_since_epoch()) >= config_.slow_down_at_s;
+  const double slow_by =
+      (slow ? config_.slow_down_factor : 1.0) * (cpu == sitl::FaultKind::kSlow ? kSlowCpu : 1.0);
+  if (slow_by != slowed_by_) {
+    costs_ = config_.costs;
+    for (core::StageCost& cost : costs_.stage) cost = core::slower(cost, slow_by);
+    slowed_by_ = slow_by;
   }
   const std::uint64_t before = system_.decision_program().decisions();
   do decision_lane_.step();
@@ -147,14 +204,58 @@ void MissionRun::record_decision(const DecisionOutput& out) {
   report_.decisions.push_back(std::move(r));
 }
 
+/// What the safety of the flight is judged by.
+void MissionRun::watch() {
+  const sitl::VehicleState& s = aircraft_.vehicle.state();
+  report::SafetyRecord& safety = report_.safety;
+  for (const double ratio : aircraft_.actuators.throttle()) {
+    if (ratio > 0.0) safety.last_thrust_s = seconds(now_.time_since_epoch());
+  }
+  if (!config_.fence.allows_over_ground({s.p_WB, s.p_WB})) safety.left_fence = true;
+  left_ground_ = left_ground_ || (system_.flight().airborne() && s.p_WB.z() > 0.5);
+  if (s.on_ground && sink_mps_ > 0.0) safety.touchdown_mps = sink_mps_;
+  sink_mps_ = s.on_ground ? 0.0 : -s.v_WB.z();
+}
+
+/// Null: the failsafe has not ended the mission.
+const char* MissionRun::failsafe_reason() {
+  const sitl::VehicleState& s = aircraft_.vehicle.state();
+  const FlightProgram& flight = system_.flight_program();
+  const bool turning =
+      std::any_of(s.thrust_ratio.begin(), s.thrust_ratio.end(), [](double ratio) { return ratio > 0.02; });
+  switch (flight.action()) {
+    case governor::Action::kHold:
+      return s.v_WB.norm() < kHover_mps && seconds(now_ - flight.action_since()) > kHolding_s ? "holding"
+                                                                                              : nullptr;
+    case governor::Action::kLand:
+      return system_.flight().landed() && !turning ? "landed" : nullptr;
+    case governor::Action::kTerminate:
+      return s.on_ground && !turning ? "terminated" : nullptr;
+    case governor::Action::kKill:
+      return s.on_ground && !turning ? "killed" : nullptr;
+    default:
+      return nullptr;
+  }
+}
+
 const char* MissionRun::end_reason() {
   const sitl::VehicleState& s = aircraft_.vehicle.state();
   const double to_goal_m = (world_.goal_W() - s.p_WB).norm();
-  // The vehicle's body, a sphere of half its span; the ground counts once it has left it.
+  const governor::Action action = system_.flight_program().action();
+  watch();
+  // The vehicle's body, a sphere of half its span; the ground counts once it has left it, unless it lands.
   const double radius_m = PipelineConfig{}.vehicle_radius_m;
-  if (world_.clearance_m(s.p_WB, radius_m) < radius_m || (system_.flight().airborne() && s.p_WB.z() < 0.3)) {
+  const bool down = left_ground_ && s.p_WB.z() < 0.3 && !system_.flight().descending();
+  const bool hard = system_.flight().descending() && report_.safety.touchdown_mps > kHardTouchdown_mps;
+  const bool motors_off = action >= governor::Action::kTerminate;
+  if (!motors_off && (world_.clearance_m(s.p_WB, radius_m) < radius_m || down || hard)) {
     report_.result.collided = true;
     return "collision";
+  }
+  if (action != governor::Action::kGoOn) {
+    if (const char* reason = failsafe_reason()) return reason;
+    if (s.battery_ratio <= 0.0 && s.on_ground) return "battery_empty";
+    return seconds(now_.time_since_epoch()) > config_.time_limit_s ? "time_limit" : nullptr;
   }
   if (to_goal_m < kReached_m && s.v_WB.norm() < kReachedSpeed_mps) {
     report_.result.reached_goal = true;
@@ -175,7 +276,8 @@ const char* MissionRun::end_reason() {
   const Trajectory& committed = system_.flight().committed();
   const bool stopped =
       now_ > committed.start_time + from_seconds(committed.duration_s()) && s.v_WB.norm() < kHover_mps;
-  return stopped ? give_up_ : nullptr;
+  const bool helpless = seconds(now_.time_since_epoch()) > config_.time_limit_s + kGiveUpAfter_s;
+  return stopped || helpless ? give_up_ : nullptr;
 }
 
 void MissionRun::summarise(double wall_s) {
@@ -228,6 +330,17 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
   }
   report_.result.reason = reason;
   report_.pools = system_.pools();
+  report_.safety.end_W = aircraft_.vehicle.state().p_WB;
+  report_.safety.landing_site_was_known = system_.flight_program().site_was_known();
+  for (const FailsafeEvent& e : system_.flight_program().events()) {
+    report::FailsafeRecord record{
+        seconds(e.time.time_since_epoch()), governor::to_string(e.action), governor::to_string(e.phase), {}};
+    for (const governor::FailsafeRow& row : governor::kFailsafeTable) {
+      if ((e.conditions & governor::bit(row.condition)) != 0)
+        record.conditions.emplace_back(governor::to_string(row.condition));
+    }
+    report_.safety.actions.push_back(std::move(record));
+  }
   summarise(std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count());
   return std::move(report_);
 }

@@ -4,12 +4,17 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "core/executive/cost_profile.hpp"
+#include "core/geometry/fence.hpp"
 #include "core/trajectory.hpp"
+#include "governor/failsafe/arbiter.hpp"
 #include "governor/policy/governor.hpp"
 #include "platform/report/mission_result.hpp"
+#include "platform/sitl/fault/fault_line.hpp"
 #include "platform/sitl/sensors/depth_camera.hpp"
 #include "platform/sitl/sensors/navigation_sensors.hpp"
 #include "platform/sitl/vehicle/vehicle.hpp"
@@ -23,6 +28,14 @@ struct FrameRecord {
   const sitl::VehicleState& truth;
   const Trajectory& committed;
   bool airborne{};
+};
+
+/// A fault, and when it begins.
+struct TimedFault {
+  sitl::Fault fault{};
+  std::optional<governor::Phase> phase{};  ///< Time counts from the first moment of this phase; none: from 0.
+  double at_s{0.0};
+  double for_s{1e6};
 };
 
 struct MissionConfig {
@@ -42,6 +55,9 @@ struct MissionConfig {
       1e300};  ///< From then on computing takes slow_down_factor times as long: a throttled CPU.
   double slow_down_factor{1.0};
   double time_limit_s{7200.0};
+  core::Fence fence{};               ///< Start and goal must be inside.
+  std::vector<TimedFault> faults{};  ///< At most sitl::FaultLine::kMost.
+  bool answers{true};  ///< False: the failsafe and the kill switch do nothing. To show that a fault matters.
   double no_progress_s{120.0};  ///< Not nearer to the goal for so long: the mission is given up, hovering.
   /// Called after every minor frame, may be empty: what a test measures.
   std::function<void(const FrameRecord&)> each_frame{};
@@ -55,8 +71,9 @@ struct Progress {
 
 /// Flies from the world's start (on the ground) to its goal. Deterministic: the same config, world and build
 /// give the same report, but for real_time_factor. `progress` (may be empty) is called about once a second of
-/// virtual time. result.env, mission and profile are left to the caller. Throws sitl::InputError for an
-/// unknown backend.
+/// virtual time. A failsafe ends a mission as "landed", "holding" (hovers for 5 s), "terminated" or "killed"
+/// (motors off, on the ground); a touch-down of at most 2 m/s is no collision. result.env, mission and
+/// profile are left to the caller. Throws sitl::InputError for an unknown backend.
 [[nodiscard]] report::MissionReport fly_mission(const sitl::World& world, const MissionConfig& config,
                                                 const std::function<void(const Progress&)>& progress);
 

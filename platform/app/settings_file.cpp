@@ -1,5 +1,8 @@
 #include "platform/app/settings_file.hpp"
 
+#include <algorithm>
+#include <vector>
+
 #include "platform/sitl/world/text_file.hpp"
 #include "platform/sitl/world/toml_reader.hpp"
 
@@ -31,13 +34,60 @@ const toml::table* section(const sitl::TomlReader& reader, const toml::table& ro
   return node->as_table();
 }
 
+void check(const sitl::TomlReader& reader, const toml::node& node, const char* key, core::FenceFault fault) {
+  if (fault != core::FenceFault::kNone) reader.refuse(node, key, core::to_string(fault));
+}
+
+/// `count` numbers; the fence itself judges their range.
+std::vector<double> numbers(const sitl::TomlReader& reader, const toml::node& node, const char* key,
+                            std::size_t count, const char* form) {
+  const toml::array* array = node.as_array();
+  if (array == nullptr || array->size() != count) reader.refuse(node, key, fmt::format("must be {}", form));
+  std::vector<double> values;
+  for (const toml::node& n : *array) {
+    const auto value = n.is_integer() || n.is_floating_point() ? n.value<double>() : std::nullopt;
+    if (!value) reader.refuse(node, key, fmt::format("must be {}", form));
+    values.push_back(*value);
+  }
+  return values;
+}
+
+void read_areas(const sitl::TomlReader& reader, const toml::table& table, const char* key,
+                core::FenceSide side, core::Fence& fence) {
+  constexpr const char* kForm = "[{ polygon = [[x, y], ...] }, { circle = [x, y, radius] }]";
+  const toml::node* list = table.get(key);
+  if (list == nullptr) return;
+  if (list->as_array() == nullptr) reader.refuse(*list, key, fmt::format("must be {}", kForm));
+  for (const toml::node& node : *list->as_array()) {
+    const toml::table* area = node.as_table();
+    if (area == nullptr || area->size() != 1) reader.refuse(node, key, fmt::format("must be {}", kForm));
+    reader.allow_keys(*area, key, {"polygon", "circle"});
+    if (const toml::node* circle = area->get("circle")) {
+      const auto v = numbers(reader, *circle, "circle", 3, "[x, y, radius]");
+      check(reader, *circle, "circle", fence.add_circle(side, {v[0], v[1]}, v[2]));
+      continue;
+    }
+    const toml::node& polygon = *area->get("polygon");
+    if (polygon.as_array() == nullptr) reader.refuse(polygon, "polygon", "must be [[x, y], [x, y], ...]");
+    std::vector<core::FencePoint> points;
+    for (const toml::node& point : *polygon.as_array()) {
+      const auto v = numbers(reader, point, "polygon", 2, "[[x, y], [x, y], ...]");
+      points.push_back({v[0], v[1]});
+    }
+    check(reader, polygon, "polygon", fence.add_polygon(side, points));
+  }
+}
+
 }  // namespace
 
 void load_settings(const std::string& path, MissionConfig& config) {
   const toml::table root = sitl::parse_toml(path, sitl::read_text(path, "a readable TOML file"));
   const sitl::TomlReader reader(path);
-  reader.allow_keys(root, "the file", {"camera", "wind", "battery", "flight", "cpu"});
+  reader.allow_keys(root, "the file", kSettingsTables);
+  read_settings(reader, root, config);
+}
 
+void read_settings(const sitl::TomlReader& reader, const toml::table& root, MissionConfig& config) {
   if (const toml::table* t = section(reader, root, "camera",
                                      {"pixels", "range_m", "rate_Hz", "latency_s", "noise_m", "noise_per_m",
                                       "pixel_dropout_ratio", "frame_dropout_ratio"})) {
@@ -69,6 +119,19 @@ void load_settings(const std::string& path, MissionConfig& config) {
   if (const toml::table* t = section(reader, root, "cpu", {"slow_down_at_s", "slow_down_factor"})) {
     read(reader, *t, "slow_down_at_s", {0, 100000}, config.slow_down_at_s);
     read(reader, *t, "slow_down_factor", {0.1, 100}, config.slow_down_factor);
+  }
+  if (const toml::table* t = section(reader, root, "fog", {"visibility_m"})) {
+    double visibility_m = config.camera.range_m;
+    read(reader, *t, "visibility_m", {5, 100}, visibility_m);
+    config.camera.range_m = std::min(config.camera.range_m, visibility_m);
+  }
+  if (const toml::table* t = section(reader, root, "fence", {"altitude_m", "keep_in", "keep_out"})) {
+    if (const toml::node* node = t->get("altitude_m")) {
+      const auto v = numbers(reader, *node, "altitude_m", 2, "[lowest, highest]");
+      check(reader, *node, "altitude_m", config.fence.set_altitude(v[0], v[1]));
+    }
+    read_areas(reader, *t, "keep_in", core::FenceSide::kKeepIn, config.fence);
+    read_areas(reader, *t, "keep_out", core::FenceSide::kKeepOut, config.fence);
   }
 }
 

@@ -90,11 +90,31 @@ struct PoolUse {
   bool tells_use{};  ///< Its owner says how much is in use.
 };
 
+/// One change of what the failsafe does.
+struct FailsafeRecord {
+  double time_s{};
+  std::string action;
+  std::string phase;                    ///< In which it was decided.
+  std::vector<std::string> conditions;  ///< That held then.
+};
+
+/// What a flight with faults is judged by; all of it is the world's truth, not the vehicle's belief.
+struct SafetyRecord {
+  std::vector<FailsafeRecord> actions;
+  double first_fault_s{-1.0};  ///< -1: none.
+  double last_thrust_s{};      ///< When a motor was last given more than zero.
+  double touchdown_mps{};      ///< Of the last time it came down.
+  bool left_fence{};
+  bool landing_site_was_known{};
+  Vector3 end_W = Vector3::Zero();
+};
+
 struct MissionReport {
   MissionResult result;
   std::vector<DecisionRecord> decisions;
   std::vector<PathPoint> path;  ///< At 10 Hz.
   std::vector<PoolUse> pools;
+  SafetyRecord safety;
 };
 
 /// One line. Numbers that are not finite become null.

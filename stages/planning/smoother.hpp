@@ -38,9 +38,10 @@ class Smoother {
   /// time; not free, and the straight piece below it gets one more way-point; still not, and the speed limit
   /// is lowered; from rest, the last resort is to fly the pieces straight and stop at each corner. kOk: every
   /// point of the trajectory keeps its box free in `view`, and speed, acceleration and jerk (20 m/s3) are
-  /// within the limits (5 %; where the start state itself is beyond a limit, never more beyond than there). kNoPath: no such
-  /// curve was found; kBudgetSpent; kInvalidArgument (not finite, fewer than two distinct points): in all
-  /// three cases `result.trajectory` is untouched. RT-safe: at most 24 solutions of at most 47 segments.
+  /// within the limits (5 %; where the start state itself is beyond a limit, never more beyond than there).
+  /// kNoPath: no such curve was found; kBudgetSpent; kInvalidArgument (not finite, fewer than two distinct
+  /// points): in all three cases `result.trajectory` is untouched. RT-safe: at most 24 solutions of at most
+  /// 47 segments.
   [[nodiscard]] Status smooth(const SmoothRequest& request, const MapView& view, core::StageBudget& budget,
                               SmoothResult& result) noexcept;
 

@@ -43,7 +43,7 @@ double FakeEsc::step(MonotonicTime now) noexcept {
     ready_ = false;
   }
   const double ratio = throttle_ / kFull;
-  if (now >= next_status_) {
+  if (now >= next_status_ && !silent_) {
     dc::EscStatus status;
     status.esc_index = config_.index;
     status.voltage = 44.4F;
@@ -52,7 +52,7 @@ double FakeEsc::step(MonotonicTime now) noexcept {
     say(status, 20, status_transfer_id_, now);
     next_status_ = now + Nanos{100'000'000};
   }
-  if (now >= next_node_status_) {
+  if (now >= next_node_status_ && !silent_) {
     say(dc::NodeStatus{.uptime_sec =
                            static_cast<std::uint32_t>(now.time_since_epoch() / Nanos{1'000'000'000})},
         24, node_status_transfer_id_, now);

@@ -27,6 +27,8 @@ class FakeEsc {
 
   /// Reads what came, sends what is due. The thrust ratio it gives the motor now, 0 .. 1.
   double step(MonotonicTime now) noexcept;
+  /// It says nothing any more, and obeys on.
+  void set_silent(bool silent) noexcept { silent_ = silent; }
   /// When it last obeyed a throttle other than zero.
   [[nodiscard]] MonotonicTime last_thrust() const noexcept { return last_thrust_; }
   [[nodiscard]] std::uint64_t commands() const noexcept { return commands_; }
@@ -40,6 +42,7 @@ class FakeEsc {
   std::array<firmware_if::dronecan::Reassembler::Session, 4> sessions_{};
   firmware_if::dronecan::Reassembler reassembler_;
   bool ready_{false};  ///< It was told zero.
+  bool silent_{false};
   std::int16_t throttle_{0};
   MonotonicTime heard_{};
   MonotonicTime last_thrust_{};

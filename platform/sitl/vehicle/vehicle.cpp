@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kAirDensity_kgpm3 = 1.225;
 constexpr double kMaxSubstep_s = 1.25e-3;
+constexpr double kLegs_mps2 = 30.0;
 
 }  // namespace
 
@@ -67,8 +68,15 @@ void Vehicle::substep(double dt_s) noexcept {
                             .cwiseQuotient(config_.inertia_kgm2);
 
   s.on_ground = s.p_WB.z() <= 0.0 && s.a_WB.z() <= 0.0;
-  if (s.on_ground) {
-    // The legs hold it: no sliding, no tipping over.
+  if (s.on_ground && !s.v_WB.isZero(0.0)) {
+    // The legs give way while they take up its speed: an accelerometer feels the touch-down.
+    const Vector3 stop_W_mps2 = -s.v_WB / dt_s;
+    s.a_WB = stop_W_mps2 * std::fmin(1.0, kLegs_mps2 / stop_W_mps2.norm());
+    s.v_WB += dt_s * s.a_WB;
+    s.p_WB += dt_s * s.v_WB;
+    s.w_WB_B.setZero();
+  } else if (s.on_ground) {
+    // They hold it: no sliding, no tipping over.
     s.p_WB.z() = 0.0;
     s.v_WB.setZero();
     s.a_WB.setZero();

@@ -59,6 +59,8 @@ class Vehicle final : public firmware_if::Motors {
   /// Advances by dt in substeps of at most 1.25 ms. An empty battery gives no thrust.
   void step(Nanos dt) noexcept;
   [[nodiscard]] const VehicleState& state() const noexcept { return state_; }
+  /// From now on; gusts go on where they are.
+  void set_mean_wind(const Vector3& mean_W_mps) noexcept { wind_.mean_W_mps = mean_W_mps; }
   [[nodiscard]] Pose X_WB() const noexcept { return {state_.q_WB.toRotationMatrix(), state_.p_WB}; }
   /// Air speed of the wind, world frame, now.
   [[nodiscard]] const Vector3& wind_W_mps() const noexcept { return wind_W_mps_; }

@@ -1,0 +1,218 @@
+#include "platform/app/scenario_command.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <thread>
+
+#include "platform/app/progress_line.hpp"
+#include "platform/app/scenario_file.hpp"
+#include "platform/app/worker_processes.hpp"
+#include "platform/report/trace_csv.hpp"
+#include "platform/sitl/world/input_error.hpp"
+
+namespace roborun::app {
+namespace {
+
+using nlohmann::json;
+using sitl::InputError;
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string path;
+  std::string junit;
+  std::string jobs{std::to_string(std::max(1U, std::thread::hardware_concurrency()))};
+  bool json{false};
+};
+
+std::vector<std::string> files_of(const std::string& path) {
+  std::error_code error;
+  if (!fs::is_directory(path, error)) return {path};
+  std::vector<std::string> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(path)) {
+    if (entry.is_regular_file() && entry.path().extension() == ".toml")
+      files.push_back(entry.path().string());
+  }
+  if (files.empty()) throw InputError(fmt::format("{}: no scenario in it: must hold .toml files", path));
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// Everything that is told of one scenario: a pure function of its file.
+json verdict_of(const Scenario& scenario) {
+  const report::MissionReport report = fly_scenario(scenario);
+  json actions = json::array();
+  for (const report::FailsafeRecord& r : report.safety.actions)
+    actions.push_back(
+        {{"time_s", r.time_s}, {"action", r.action}, {"phase", r.phase}, {"conditions", r.conditions}});
+  const std::vector<std::string> complaints = complaints_of(scenario, report);
+  return {{"name", scenario.name},
+          {"about", scenario.about},
+          {"passed", complaints.empty()},
+          {"complaints", complaints},
+          {"outcome", report.result.reason},
+          {"actions", actions},
+          {"first_fault_s", report.safety.first_fault_s},
+          {"last_thrust_s", report.safety.last_thrust_s},
+          {"touchdown_mps", report.safety.touchdown_mps},
+          {"landing_site_known", report.safety.landing_site_was_known},
+          {"mission_time_s", report.result.mission_time_s},
+          {"state_hash", report.result.state_hash}};
+}
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '<':
+        out += "&lt;";
+        break;
+      case '&':
+        out += "&amp;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    }
+  }
+  return out;
+}
+
+std::string junit_of(const std::vector<json>& verdicts) {
+  const auto failed =
+      std::count_if(verdicts.begin(), verdicts.end(), [](const json& v) { return !v["passed"]; });
+  double total_s = 0.0;
+  for (const json& v : verdicts) total_s += v["mission_time_s"].get<double>();
+  std::string xml = fmt::format(
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuite name=\"roborun scenario\" tests=\"{}\" "
+      "failures=\"{}\" time=\"{:.3f}\">\n",
+      verdicts.size(), failed, total_s);
+  for (const json& v : verdicts) {
+    xml += fmt::format("  <testcase classname=\"scenario\" name=\"{}\" time=\"{:.3f}\"", escaped(v["name"]),
+                       v["mission_time_s"].get<double>());
+    if (v["passed"]) {
+      xml += "/>\n";
+      continue;
+    }
+    const auto complaints = v["complaints"].get<std::vector<std::string>>();
+    xml += fmt::format(">\n    <failure message=\"{}\"/>\n  </testcase>\n",
+                       escaped(fmt::format("{}", fmt::join(complaints, "; "))));
+  }
+  return xml + "</testsuite>\n";
+}
+
+void tell(const json& v) {
+  std::vector<std::string> actions;
+  for (const json& a : v["actions"]) actions.push_back(a["action"]);
+  fmt::print("{}  {:<34} {:<12} {:6.1f} s  {}\n", v["passed"] ? "pass" : "FAIL", v["name"].get<std::string>(),
+             v["outcome"].get<std::string>(), v["mission_time_s"].get<double>(), fmt::join(actions, " > "));
+  for (const json& c : v["complaints"]) fmt::print("      {}\n", c.get<std::string>());
+}
+
+int run_scenarios(const Options& options) {
+  int jobs = 0;
+  const auto [end, error] =
+      std::from_chars(options.jobs.data(), options.jobs.data() + options.jobs.size(), jobs);
+  if (error != std::errc{} || end != options.jobs.data() + options.jobs.size() || jobs < 1 || jobs > 1024)
+    throw InputError(
+        fmt::format("--jobs: '{}' is out of range: must be a whole number from 1 to 1024", options.jobs));
+  if (const std::string why = report::cannot_write(options.junit); !why.empty()) throw InputError(why);
+  // Every file is checked before the first one is flown.
+  std::vector<Scenario> scenarios;
+  for (const std::string& file : files_of(options.path)) scenarios.push_back(load_scenario(file));
+
+  std::vector<json> verdicts(scenarios.size());
+  std::vector<std::size_t> tasks(scenarios.size());
+  std::iota(tasks.begin(), tasks.end(), std::size_t{0});
+  std::size_t done = 0;
+  ProgressLine line;
+  WorkerCalls calls;
+  calls.work = [&](std::size_t i) { return verdict_of(scenarios[i]).dump(); };
+  calls.answered = [&](std::size_t i, const std::string& answer) {
+    verdicts[i] = json::parse(answer);
+    ++done;
+    if (line.due()) line.show(fmt::format("{} of {} scenarios flown", done, scenarios.size()));
+  };
+  calls.died = [&](std::size_t i) {
+    throw InputError(fmt::format("{}: the flight's process died", scenarios[i].name));
+  };
+  (void)run_in_processes(tasks, jobs, calls);
+
+  const bool passed =
+      std::all_of(verdicts.begin(), verdicts.end(), [](const json& v) { return v["passed"]; });
+  for (const json& v : verdicts) {
+    if (options.json)
+      fmt::print("{}\n", v.dump());
+    else
+      tell(v);
+  }
+  if (!options.json) {
+    const auto good =
+        std::count_if(verdicts.begin(), verdicts.end(), [](const json& v) { return v["passed"]; });
+    fmt::print("{} of {} passed\n", good, verdicts.size());
+  }
+  if (!options.junit.empty()) {
+    if (const std::string why = report::write_file(options.junit, junit_of(verdicts)); !why.empty())
+      throw InputError(why);
+  }
+  return passed ? 0 : 1;
+}
+
+}  // namespace
+
+void add_scenario_command(CLI::App& app, std::function<int()>& run) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* scenario_app =
+      app.add_subcommand("scenario", "Fly scenarios with faults from files, and judge each flight");
+  scenario_app->require_subcommand(1);
+  CLI::App* run_app = scenario_app->add_subcommand("run", "Fly one file, or every .toml file of a folder");
+  run_app->footer(
+      "Examples:\n"
+      "  roborun scenario run platform/sitl/scenarios                 the library\n"
+      "  roborun scenario run platform/sitl/scenarios/gnss_off.toml\n"
+      "  roborun scenario run my_scenarios --junit out/junit.xml --jobs 4\n\n"
+      "A scenario:\n"
+      "  [scenario]\n"
+      "  about = \"Satellite navigation is lost in cruise: it lands\"\n"
+      "  world = \"worlds/yard.toml\"      # relative to this file; or environment = \"14\"\n"
+      "  seed = 1                        # design = \"aware\", cost_factor = 1; [camera] [wind] [fog] "
+      "[battery] [flight] "
+      "[cpu]\n"
+      "  [fence]                         # [fence] as in a settings file: platform/README.md\n"
+      "  altitude_m = [0.5, 9]\n"
+      "  keep_in = [{ polygon = [[-5, -10], [45, -10], [45, 10], [-5, 10]] }]\n"
+      "  keep_out = [{ circle = [20, 0, 4] }]      # x, y, radius\n"
+      "  [[fault]]\n"
+      "  component = \"gnss\"              # imu gnss barometer depth battery esc esc_status can "
+      "kill_switch\n"
+      "                                  # link planner map clock cpu wind\n"
+      "  kind = \"off\"                    # stuck garbage wrong slow delayed intermittent on\n"
+      "  instance = 0                    # of depth (0..5), esc and esc_status (0..3); all if left out\n"
+      "  phase = \"mission\"               # ground take_off mission hold return land; the start if left "
+      "out\n"
+      "  at_s = 2.0                      # after the phase began\n"
+      "  for_s = 1.0                     # for ever if left out\n"
+      "  [expect]\n"
+      "  outcome = \"landed\"              # reached_goal landed holding terminated killed collision ...\n"
+      "  action = \"land\"                 # go_on hold return land terminate kill: the last one\n"
+      "  condition = \"gnss\"              # that held when an action was decided\n"
+      "  within_s = 1.5                  # from the first fault to the first action\n"
+      "  touchdown_mps = 1.5             # motors_stop_within_s, home_within_m, landing_site_known\n\n"
+      "Exit code: 0 all passed, 1 at least one failed (its line says why), 2 bad input.");
+  run_app->add_option("path", options->path, "A scenario file, or a folder of them")->required();
+  run_app->add_option("--junit", options->junit, "Write the verdicts to this file as JUnit XML");
+  run_app->add_option("--jobs", options->jobs, "Flights at a time, 1 .. 1024")->capture_default_str();
+  run_app->add_flag("--json", options->json, "One JSON object a scenario on standard output, nothing else");
+  run_app->callback([options, &run] { run = [options] { return run_scenarios(*options); }; });
+}
+
+}  // namespace roborun::app

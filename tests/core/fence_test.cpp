@@ -1,0 +1,224 @@
+#include "core/geometry/fence.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "core/random/counter_rng.hpp"
+#include "tests/support/no_alloc_scope.hpp"
+
+namespace roborun::core {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// Whole numbers of 2^-10 m: the reference calculates with them, without rounding.
+struct Node {
+  std::int64_t x{};
+  std::int64_t y{};
+};
+FencePoint metres(const Node& n) {
+  return {static_cast<double>(n.x) / 1024.0, static_cast<double>(n.y) / 1024.0};
+}
+__extension__ using Wide = __int128;
+
+Wide cross(const Node& a, const Node& b, const Node& c) {
+  return Wide{b.x - a.x} * (c.y - a.y) - Wide{b.y - a.y} * (c.x - a.x);
+}
+bool on_edge(const Node& a, const Node& b, const Node& p) {
+  return cross(a, b, p) == 0 && Wide{p.x - a.x} * (p.x - b.x) + Wide{p.y - a.y} * (p.y - b.y) <= 0;
+}
+/// Slow and exact: parity of the crossings of a ray to the right. On an edge: neither inside nor outside.
+enum class Where { kInside, kOutside, kEdge };
+Where where(const std::vector<Node>& polygon, const Node& p) {
+  bool odd = false;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    Node a = polygon[i];
+    Node b = polygon[(i + 1) % polygon.size()];
+    if (on_edge(a, b, p)) return Where::kEdge;
+    if (a.y > b.y) std::swap(a, b);
+    if (a.y <= p.y && p.y < b.y && cross(a, b, p) > 0) odd = !odd;
+  }
+  return odd ? Where::kInside : Where::kOutside;
+}
+/// The edge meets the closed rectangle, by clipping its parameter (exact, as fractions).
+bool clips(const Node& a, const Node& b, const Node& low, const Node& high) {
+  // Largest lower and smallest upper bound of t in [0, 1], as numerator / denominator with denominator > 0.
+  Wide from = 0, from_d = 1, to = 1, to_d = 1;
+  const auto cut = [&](std::int64_t start, std::int64_t end, std::int64_t lower, std::int64_t upper) {
+    const Wide step = end - start;
+    if (step == 0) return lower <= start && start <= upper;
+    Wide t0 = lower - start, t1 = upper - start, d = step;
+    if (d < 0) {
+      t0 = -t0, t1 = -t1, d = -d;
+      std::swap(t0, t1);
+    }
+    if (t0 * from_d > from * d) from = t0, from_d = d;
+    if (t1 * to_d < to * d) to = t1, to_d = d;
+    return true;
+  };
+  return cut(a.x, b.x, low.x, high.x) && cut(a.y, b.y, low.y, high.y) && from * to_d <= to * from_d;
+}
+
+Node random_node(CounterRng& rng, std::int64_t range) {
+  const auto span = static_cast<std::uint64_t>(2 * range + 1);
+  const auto x = static_cast<std::int64_t>(rng.below(span)) - range;
+  const auto y = static_cast<std::int64_t>(rng.below(span)) - range;
+  return {x, y};
+}
+
+/// A random polygon that the fence accepts; small ranges make vertices and edges be hit often.
+std::vector<Node> random_polygon(CounterRng& rng, std::int64_t range, FenceSide side, Fence& fence) {
+  for (;;) {
+    std::vector<Node> nodes;
+    std::vector<FencePoint> points;
+    const std::size_t count = 3 + rng.below(6);
+    for (std::size_t i = 0; i < count; ++i) {
+      nodes.push_back(random_node(rng, range));
+      points.push_back(metres(nodes.back()));
+    }
+    fence = {};
+    if (fence.add_polygon(side, points) == FenceFault::kNone) return nodes;
+  }
+}
+
+TEST(Fence, DecidesAMillionPointsAsTheSlowExactReference) {
+  CounterRng rng(31);
+  std::array<int, 3> seen{};
+  for (int round = 0; round < 1000; ++round) {
+    const std::int64_t range = round % 2 == 0 ? 6 : 16'000 * 1024;
+    const FenceSide side = round % 4 < 2 ? FenceSide::kKeepIn : FenceSide::kKeepOut;
+    Fence fence;
+    const std::vector<Node> polygon = random_polygon(rng, range, side, fence);
+    for (int i = 0; i < 1000; ++i) {
+      Node p = random_node(rng, range + range / 8 + 1);
+      if (i % 10 == 0) p = polygon[rng.below(polygon.size())];
+      const Where truth = where(polygon, p);
+      ++seen[static_cast<std::size_t>(truth)];
+      const bool wanted = truth == (side == FenceSide::kKeepIn ? Where::kInside : Where::kOutside);
+      const FencePoint m = metres(p);
+      ASSERT_EQ(fence.allows(Vector3(m.x_m, m.y_m, 5.0)), wanted) << "round " << round << ", point " << i;
+    }
+  }
+  for (const int count : seen) EXPECT_GT(count, 10000);
+}
+
+TEST(Fence, DecidesBoxesAsTheSlowExactReference) {
+  CounterRng rng(32);
+  int allowed = 0;
+  for (int round = 0; round < 2000; ++round) {
+    const std::int64_t range = round % 2 == 0 ? 8 : 500 * 1024;
+    const FenceSide side = round % 4 < 2 ? FenceSide::kKeepIn : FenceSide::kKeepOut;
+    Fence fence;
+    const std::vector<Node> polygon = random_polygon(rng, range, side, fence);
+    for (int i = 0; i < 100; ++i) {
+      const Node low = random_node(rng, range);
+      const std::int64_t size = range / 4 + 1;
+      const Node high{low.x + static_cast<std::int64_t>(rng.below(static_cast<std::uint64_t>(size))),
+                      low.y + static_cast<std::int64_t>(rng.below(static_cast<std::uint64_t>(size)))};
+      bool touched = false;
+      for (std::size_t k = 0; k < polygon.size(); ++k)
+        touched = touched || clips(polygon[k], polygon[(k + 1) % polygon.size()], low, high);
+      const bool wanted =
+          !touched && where(polygon, low) == (side == FenceSide::kKeepIn ? Where::kInside : Where::kOutside);
+      const FencePoint a = metres(low);
+      const FencePoint b = metres(high);
+      ASSERT_EQ(fence.allows(Aabb{{a.x_m, a.y_m, 1.0}, {b.x_m, b.y_m, 2.0}}), wanted) << round << ", " << i;
+      allowed += wanted ? 1 : 0;
+    }
+  }
+  EXPECT_GT(allowed, 10000);
+}
+
+TEST(Fence, CirclesKeepInAndOut) {
+  Fence in;
+  ASSERT_EQ(in.add_circle(FenceSide::kKeepIn, {10.0, 0.0}, 5.0), FenceFault::kNone);
+  EXPECT_TRUE(in.allows(Vector3(14.9, 0.0, 0.0)));
+  EXPECT_FALSE(in.allows(Vector3(15.0, 0.0, 0.0))) << "the line itself is forbidden";
+  EXPECT_FALSE(in.allows(Aabb{{9.0, 3.0, 0.0}, {13.5, 4.0, 1.0}}))
+      << "one corner at (3.5, 4) from the centre";
+  EXPECT_TRUE(in.allows(Aabb{{9.0, 3.0, 0.0}, {12.9, 4.0, 1.0}}));
+  Fence out;
+  ASSERT_EQ(out.add_circle(FenceSide::kKeepOut, {10.0, 0.0}, 5.0), FenceFault::kNone);
+  EXPECT_FALSE(out.allows(Vector3(15.0, 0.0, 0.0)));
+  EXPECT_TRUE(out.allows(Vector3(15.1, 0.0, 0.0)));
+  EXPECT_FALSE(out.allows(Aabb{{0.0, -10.0, 0.0}, {20.0, 10.0, 1.0}})) << "around the whole circle";
+  EXPECT_TRUE(out.allows(Aabb{{13.6, 3.6, 0.0}, {20.0, 10.0, 1.0}})) << "past it at 5.09 m";
+}
+
+TEST(Fence, HeightsHoldForWholeBoxes) {
+  Fence fence;
+  ASSERT_EQ(fence.set_altitude(2.0, 10.0), FenceFault::kNone);
+  EXPECT_FALSE(fence.empty());
+  EXPECT_TRUE(fence.allows(Aabb{{0, 0, 2.1}, {1, 1, 9.9}}));
+  EXPECT_FALSE(fence.allows(Aabb{{0, 0, 2.0}, {1, 1, 3.0}}));
+  EXPECT_FALSE(fence.allows(Aabb{{0, 0, 9.0}, {1, 1, 10.0}}));
+  EXPECT_TRUE(fence.allows_over_ground(Aabb{{0, 0, 0.0}, {1, 1, 3.0}}));
+}
+
+TEST(Fence, AnAreaMoreOnlyTakesSpaceAway) {
+  CounterRng rng(33);
+  Fence fence;
+  const std::array<FencePoint, 4> yard{{{-50, -50}, {50, -50}, {50, 50}, {-50, 50}}};
+  ASSERT_EQ(fence.add_polygon(FenceSide::kKeepIn, yard), FenceFault::kNone);
+  for (int area = 0; area < 10; ++area) {
+    const Fence before = fence;
+    ASSERT_EQ(fence.add_circle(area % 2 == 0 ? FenceSide::kKeepOut : FenceSide::kKeepIn,
+                               {rng.uniform(-20, 20), rng.uniform(-20, 20)}, area % 2 == 0 ? 5.0 : 60.0),
+              FenceFault::kNone);
+    for (int i = 0; i < 2000; ++i) {
+      const double x_m = rng.uniform(-60, 60);
+      const double y_m = rng.uniform(-60, 60);
+      if (fence.allows(Vector3(x_m, y_m, 0.0))) {
+        ASSERT_TRUE(before.allows(Vector3(x_m, y_m, 0.0)));
+      }
+    }
+  }
+}
+
+TEST(Fence, RefusesBadAreasByNameAndStaysAsItWas) {
+  using P = std::vector<FencePoint>;
+  const auto add = [](const P& points) {
+    Fence fence;
+    const FenceFault fault = fence.add_polygon(FenceSide::kKeepIn, points);
+    EXPECT_EQ(fence.empty(), fault != FenceFault::kNone);
+    return fault;
+  };
+  EXPECT_EQ(add({}), FenceFault::kTooFewPoints);
+  EXPECT_EQ(add({{0, 0}}), FenceFault::kTooFewPoints);
+  EXPECT_EQ(add({{0, 0}, {1, 0}}), FenceFault::kTooFewPoints);
+  EXPECT_EQ(add({{0, 0}, {1, 0}, {0, 1}}), FenceFault::kNone);
+  EXPECT_EQ(add({{0, 0}, {1, 0}, {0, kNaN}}), FenceFault::kNotFinite);
+  EXPECT_EQ(add({{0, 0}, {1e9, 0}, {0, 1}}), FenceFault::kNotFinite);
+  EXPECT_EQ(add({{0, 0}, {2, 2}, {2, 0}, {0, 2}}), FenceFault::kTouchesItself) << "a bow tie";
+  EXPECT_EQ(add({{0, 0}, {1, 0}, {2, 0}}), FenceFault::kTouchesItself) << "no area";
+  EXPECT_EQ(add({{0, 0}, {0, 0}, {1, 0}, {0, 1}}), FenceFault::kTouchesItself) << "a point twice";
+  EXPECT_EQ(add({{0, 0}, {4, 0}, {4, 4}, {2, 0}, {0, 4}}), FenceFault::kTouchesItself) << "a tip on an edge";
+  EXPECT_EQ(add({{0, 0}, {2, 0}, {4, 0}, {4, 4}, {0, 4}}), FenceFault::kNone) << "a point on a straight side";
+  EXPECT_EQ(add(P(Fence::kMaxPoints + 1, {0, 0})), FenceFault::kTooManyPoints);
+  Fence fence;
+  EXPECT_EQ(fence.add_circle(FenceSide::kKeepIn, {0, 0}, 0.0), FenceFault::kRadius);
+  EXPECT_EQ(fence.add_circle(FenceSide::kKeepIn, {0, 0}, kNaN), FenceFault::kNotFinite);
+  EXPECT_EQ(fence.set_altitude(5.0, 5.0), FenceFault::kAltitude);
+  EXPECT_EQ(fence.set_altitude(kNaN, 5.0), FenceFault::kNotFinite);
+  EXPECT_TRUE(fence.empty());
+  for (std::size_t i = 0; i < Fence::kMaxAreas; ++i)
+    EXPECT_EQ(fence.add_circle(FenceSide::kKeepIn, {0, 0}, 9.0), FenceFault::kNone);
+  EXPECT_EQ(fence.add_circle(FenceSide::kKeepIn, {0, 0}, 9.0), FenceFault::kTooManyAreas);
+}
+
+TEST(Fence, NaNAndTheFarAwayAreNeverPermittedAndNothingAllocates) {
+  Fence fence;
+  ASSERT_EQ(fence.add_circle(FenceSide::kKeepOut, {0, 0}, 1.0), FenceFault::kNone);
+  const test::NoAllocScope scope;
+  EXPECT_FALSE(fence.allows(Vector3(kNaN, 5.0, 5.0)));
+  EXPECT_FALSE(fence.allows(Vector3(5.0, 5.0, kNaN)));
+  EXPECT_FALSE(fence.allows(Vector3(1e6, 5.0, 5.0)));
+  EXPECT_FALSE(fence.allows(Aabb{{5, 5, 5}, {4, 5, 5}})) << "an empty box";
+  EXPECT_EQ(scope.count(), 0U);
+}
+
+}  // namespace
+}  // namespace roborun::core

@@ -1,0 +1,193 @@
+#include "platform/sitl/fault/faulty_sensors.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "platform/sitl/sensors/depth_camera.hpp"
+#include "platform/sitl/world/world.hpp"
+
+namespace roborun::sitl {
+namespace {
+
+constexpr Nanos kFrame{2'500'000};
+
+struct Bench {
+  FaultLine line;
+  FaultySensors sensors{NavigationSensors({}, 7)};
+  NavigationSensors twin{{}, 7};
+  VehicleState state;
+  MonotonicTime now{};
+
+  Bench() { sensors.connect(&line); }
+  void frame() {
+    now += kFrame;
+    line.advance(now);
+    state.p_WB.x() += 0.01;
+    sensors.sample(now, state);
+    twin.sample(now, state);
+  }
+  void run(double time_s) {
+    for (int i = 0; i < static_cast<int>(time_s * 400); ++i) frame();
+  }
+  /// What comes out of both within a second, frame by frame.
+  template <typename Sample>
+  std::pair<std::vector<Sample>, std::vector<Sample>> second() {
+    std::pair<std::vector<Sample>, std::vector<Sample>> out;
+    for (int i = 0; i < 400; ++i) {
+      frame();
+      Sample s;
+      while (sensors.read(s) == Status::kOk) out.first.push_back(s);
+      while (twin.read(s) == Status::kOk) out.second.push_back(s);
+    }
+    return out;
+  }
+};
+
+TEST(FaultySensors, PassEverythingAsItIsWithoutAFault) {
+  Bench bench;
+  const auto [got, wanted] = bench.second<firmware_if::GnssFix>();
+  ASSERT_GT(wanted.size(), 5U);
+  ASSERT_EQ(got.size(), wanted.size());
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    EXPECT_EQ(got[i].p_WB_m, wanted[i].p_WB_m);
+    EXPECT_EQ(got[i].stamp, wanted[i].stamp);
+  }
+}
+
+TEST(FaultySensors, EveryKindDoesWhatItsNameSays) {
+  for (const auto kind : {FaultKind::kOff, FaultKind::kStuck, FaultKind::kGarbage, FaultKind::kWrong,
+                          FaultKind::kSlow, FaultKind::kDelayed, FaultKind::kIntermittent}) {
+    Bench bench;
+    (void)bench.second<firmware_if::GnssFix>();
+    bench.line.inject({Component::kGnss, kind}, Nanos{std::chrono::seconds{2}});
+    const auto [got, wanted] = bench.second<firmware_if::GnssFix>();
+    ASSERT_GT(wanted.size(), 5U);
+    SCOPED_TRACE(kFaultKindNames[static_cast<std::size_t>(kind)]);
+    switch (kind) {
+      case FaultKind::kOff:
+        EXPECT_TRUE(got.empty());
+        break;
+      case FaultKind::kStuck:
+        ASSERT_GT(got.size(), 2U);
+        EXPECT_EQ(got[1].p_WB_m, got[0].p_WB_m);
+        EXPECT_GT(got[1].stamp, got[0].stamp) << "fresh stamps";
+        break;
+      case FaultKind::kGarbage: {
+        ASSERT_GT(got.size(), 2U);
+        int senseless = 0;
+        for (const auto& fix : got) senseless += std::fabs(fix.p_WB_m[0]) < 1000.0 ? 0 : 1;
+        EXPECT_GT(senseless, 4);
+        break;
+      }
+      case FaultKind::kWrong:
+        ASSERT_EQ(got.size(), wanted.size());
+        EXPECT_DOUBLE_EQ(got[0].p_WB_m[1], wanted[0].p_WB_m[1] + 30.0);
+        break;
+      case FaultKind::kSlow:
+        EXPECT_LE(got.size(), 2U);
+        break;
+      case FaultKind::kDelayed:
+        ASSERT_GT(got.size(), 2U);
+        EXPECT_LT(got.size(), wanted.size()) << "the first ones are still on their way";
+        EXPECT_EQ(got[0].p_WB_m, wanted[0].p_WB_m);
+        break;
+      case FaultKind::kIntermittent:
+        EXPECT_GT(got.size(), 0U);
+        EXPECT_LT(got.size(), wanted.size());
+        break;
+      default:
+        FAIL();
+    }
+    // Over after two seconds, and what comes is fresh.
+    (void)bench.second<firmware_if::GnssFix>();
+    const auto [after, healthy] = bench.second<firmware_if::GnssFix>();
+    ASSERT_EQ(after.size(), healthy.size());
+    EXPECT_EQ(after.back().p_WB_m, healthy.back().p_WB_m);
+  }
+}
+
+TEST(FaultySensors, AClockThatRunsAheadShiftsOnlyTheStamps) {
+  Bench bench;
+  bench.line.inject({Component::kClock, FaultKind::kWrong}, Nanos{std::chrono::seconds{9}});
+  const auto [got, wanted] = bench.second<firmware_if::GnssFix>();
+  ASSERT_GT(got.size(), 5U);
+  EXPECT_EQ(got[3].stamp - wanted[3].stamp, Nanos{200'000'000});
+  EXPECT_EQ(got[3].p_WB_m, wanted[3].p_WB_m);
+}
+
+TEST(FaultySensors, OnlyTheInstanceThatIsNamedFails) {
+  FaultLine line;
+  line.inject({Component::kDepth, FaultKind::kOff, 2}, Nanos{1000});
+  EXPECT_EQ(line.of(Component::kDepth, 2), FaultKind::kOff);
+  EXPECT_EQ(line.of(Component::kDepth, 1), FaultKind::kNone);
+  EXPECT_EQ(line.of(Component::kEsc, 2), FaultKind::kNone);
+  line.inject({Component::kDepth, FaultKind::kStuck}, Nanos{1000});
+  EXPECT_EQ(line.of(Component::kDepth, 2), FaultKind::kStuck) << "the last one counts";
+  line.advance(MonotonicTime{Nanos{1000}});
+  EXPECT_EQ(line.of(Component::kDepth, 2), FaultKind::kNone) << "over";
+}
+
+/// A wall five metres ahead.
+World wall() {
+  WorldDescription d;
+  d.bounds_W = {{-5, -5, 0.5}, {20, 5, 8}};
+  d.start_W = Vector3(0, 0, 4);
+  d.goal_W = Vector3(3, 0, 4);
+  d.boxes.push_back({{5, -5, 0}, {6, 5, 12}});
+  return World(std::move(d));
+}
+
+TEST(FaultyDepthCamera, EveryKindDoesWhatItsNameSays) {
+  const World world = wall();
+  const auto mounts = six_camera_mounts();
+  const auto picture = [&](FaultKind kind, double for_s, int& frames) {
+    DepthCameraConfig config;
+    config.pixels = 8;
+    config.frame_dropout_ratio = 0.0;
+    SimulatedDepthCamera inner(world, config, mounts[0], 3, 0);
+    FaultLine line;
+    FaultyDepthCamera sut(inner, 0, line);
+    MonotonicTime now{};
+    firmware_if::DepthFrame frame;
+    std::vector<float> last;
+    std::uint32_t sequence = 0;
+    frames = 0;
+    for (int i = 0; i < static_cast<int>((1.0 + for_s) * 400); ++i) {
+      now += kFrame;
+      line.advance(now);
+      if (i == 400) line.inject({Component::kDepth, kind}, from_seconds(for_s));
+      inner.expose(now, {Matrix3::Identity(), Vector3(0, 0, 4)});
+      if (sut.read(frame) != Status::kOk || i <= 400) continue;
+      ++frames;
+      EXPECT_GT(frame.sequence, sequence) << "never the same frame twice";
+      sequence = frame.sequence;
+      last.assign(frame.depth_m.begin(), frame.depth_m.end());
+    }
+    return last;
+  };
+  int healthy = 0;
+  const std::vector<float> sane = picture(FaultKind::kNone, 1.0, healthy);
+  ASSERT_GE(healthy, 18);
+  EXPECT_NEAR(sane[27], 5.0F, 0.2F);
+  int frames = 0;
+  (void)picture(FaultKind::kOff, 1.0, frames);
+  EXPECT_EQ(frames, 0);
+  (void)picture(FaultKind::kSlow, 1.0, frames);
+  EXPECT_LE(frames, 3);
+  EXPECT_GE(frames, 1);
+  (void)picture(FaultKind::kIntermittent, 1.0, frames);
+  EXPECT_GT(frames, 3);
+  EXPECT_LT(frames, 17);
+  EXPECT_NEAR(picture(FaultKind::kWrong, 1.0, frames)[27], 2.5F, 0.1F);
+  for (const float depth_m : picture(FaultKind::kGarbage, 1.0, frames)) EXPECT_FALSE(depth_m > 0.0F);
+  (void)picture(FaultKind::kDelayed, 1.0, frames);
+  EXPECT_GE(frames, 1);
+  EXPECT_LE(frames, 3);
+  EXPECT_EQ(picture(FaultKind::kStuck, 1.0, frames), picture(FaultKind::kStuck, 0.5, frames))
+      << "the image before the fault, however long it lasts";
+}
+
+}  // namespace
+}  // namespace roborun::sitl
