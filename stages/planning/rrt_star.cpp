@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
+#include "stages/perception/polled_view.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -240,7 +241,7 @@ void RrtStar::clear(Search& s) noexcept {
   add_node(request.start_W, -1, s.work);
 }
 
-Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::StageBudget& budget,
+Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::StageBudget& budget,
                      PlanResult& result) noexcept {
   result = {};
   const Vector3 size = request.bounds_W.size();
@@ -249,7 +250,8 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::Stag
     return Status::kInvalidArgument;
   }
   core::Work& work = result.work;
-  if (!view.is_free(Aabb::around(request.start_W, request.radius_m), work.units))
+  const PolledView view(map, budget, work);
+  if (!map.is_free(Aabb::around(request.start_W, request.radius_m), work.units))
     return escape(request, view, result);
   const bool goal_bad = !request.bounds_W.contains(request.goal_W) ||
                         view.at(request.goal_W, work.units) == CellState::kOccupied;
