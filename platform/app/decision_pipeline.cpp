@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/executive/frame_table.hpp"
 #include "core/memory/static_vector.hpp"
 
 namespace roborun::app {
@@ -152,7 +151,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
     out.kind = DecisionKind::kNew;
     out.trajectory = smoothed.trajectory;
   } else if (committed_until_s < 1e300) {
-    const MonotonicTime soonest = in.now + out.latency + core::kMinorFrame;
+    const MonotonicTime soonest = in.now + out.latency + config_.minor_frame;
     const TrajectoryPoint then = in.committed->at(soonest);
     Trajectory stop;
     if (then.v_W.norm() > 0.05 &&

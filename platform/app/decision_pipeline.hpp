@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/executive/frame_table.hpp"
 #include "core/executive/stage_budget.hpp"
 #include "core/executive/stage_meter.hpp"
 #include "core/geometry/vector.hpp"
@@ -25,6 +26,7 @@ struct PipelineConfig {
   double inflation_m{0.3};
   double horizon_m{24.0};  ///< No way-point farther than this: one metre less than the cameras see.
   double acceleration_mps2{4.0};
+  Nanos minor_frame{core::kMinorFrame};  ///< Of the flight lane: no stop takes over sooner.
   Aabb map_bounds_W{};  ///< What the map stores; its heights limit what counts as seen volume.
 };
 

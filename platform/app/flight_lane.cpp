@@ -33,12 +33,14 @@ void FlightLane::commit(MonotonicTime now) {
   if (!flying_) {
     if (now - *first_estimate_ < kSettle) return;
     committed_ = take_off_(state.p_WB, now);
+    ++committed_number_;
     flying_ = true;
   }
   if (!airborne_ && now > committed_.start_time + from_seconds(committed_.duration_s()) + kHover)
     airborne_ = true;
   if (offered_ && offered_->start_time <= now) {
     committed_ = *offered_;
+    ++committed_number_;
     offered_.reset();
   }
 }

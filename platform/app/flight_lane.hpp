@@ -41,6 +41,8 @@ class FlightLane {
   }
 
   [[nodiscard]] const Trajectory& committed() const { return committed_; }
+  /// Another number for each committed trajectory; 0 before the first.
+  [[nodiscard]] std::uint64_t committed_number() const { return committed_number_; }
   [[nodiscard]] const stages::Estimator& estimator() const { return estimator_; }
   [[nodiscard]] const stages::Tracker& tracker() const { return tracker_; }
   /// The climb is over: decisions may begin.
@@ -51,6 +53,7 @@ class FlightLane {
   stages::Tracker tracker_;
   TakeOff take_off_;
   Trajectory committed_{};
+  std::uint64_t committed_number_{0};
   std::optional<Trajectory> offered_;
   firmware_if::MotorCommand command_{};
   std::optional<MonotonicTime> first_estimate_;

@@ -7,14 +7,20 @@ namespace roborun::app {
 
 using core::SlotId;
 
+namespace {
+
+constexpr Nanos kLatestStop{20'000'000};  // 12 cm at 6 m/s
+
+}  // namespace
+
 void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
   const MonotonicTime now = lane.release();
   switch (slot) {
     case SlotId::kWorld:
-      aircraft_.fly_to(now);
+      aircraft_.begin_frame(now);
       return;
     case SlotId::kSense:
-      flight_.sense(aircraft_.sensors, aircraft_.sensors, aircraft_.sensors);
+      flight_.sense(aircraft_.imu(), aircraft_.gnss(), aircraft_.barometer());
       return;
     case SlotId::kCommit:
       if (mail_.offer.take()) {
@@ -27,13 +33,17 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
       flight_.commit(now);
       return;
     case SlotId::kTrack:
-      flight_.track(now, aircraft_.actuators);
-      aircraft_.actuators.step(now);
+      flight_.track(now, aircraft_.motors());
+      aircraft_.end_frame(now);
       return;
     case SlotId::kPublish: {
       FlightReport& report = mail_.report.draft();
-      report.estimator = flight_.estimator();
-      report.committed = flight_.committed();
+      report.estimated = flight_.estimator().state(report.state) == Status::kOk;
+      report.past.catch_up(flight_.estimator().past());
+      if (report.committed_number != flight_.committed_number()) {
+        report.committed = flight_.committed();
+        report.committed_number = flight_.committed_number();
+      }
       report.airborne = flight_.airborne();
       mail_.report.publish();
       return;
@@ -46,9 +56,8 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
 void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
   (void)mail_.report.take();
   const FlightReport& report = mail_.report.read();
-  stages::EstimatedState state;
-  if (given_up_.load(std::memory_order_acquire) || !report.airborne ||
-      report.estimator.state(state) != Status::kOk) {
+  const stages::EstimatedState& state = report.state;
+  if (given_up_.load(std::memory_order_acquire) || !report.airborne || !report.estimated) {
     lane.end_frame();
     return;
   }
@@ -57,7 +66,7 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
     stages::PosedDepthFrame posed;
     Pose X_WB;
     if (camera->read(posed.frame) != Status::kOk ||
-        report.estimator.pose_at(posed.frame.stamp, X_WB) != Status::kOk)
+        report.past.pose_at(posed.frame.stamp, X_WB) != Status::kOk)
       continue;
     posed.X_WC = core::camera_pose(X_WB, camera->mount());
     (void)frames_.push_back(posed);
@@ -78,13 +87,34 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
 
 void DecisionProgram::hand_over(const core::LaneExecutive& lane) noexcept {
   if (out_.kind == DecisionKind::kKeep) return;
-  // Too late for its own start: the vehicle already flies its braking tail, and the result is of no use.
-  if (out_.kind == DecisionKind::kNew && out_.trajectory.start_time < lane.now()) {
+  // Too late for its own start: the vehicle already flies its braking tail, and the result is of no use. A
+  // stop is still better a little late; after a stall it would begin where the vehicle is no more.
+  const Nanos latest = out_.kind == DecisionKind::kNew ? Nanos{0} : kLatestStop;
+  if (out_.trajectory.start_time + latest < lane.now()) {
     ++too_late_;
     return;
   }
   mail_.offer.draft() = {out_.trajectory, out_.kind == DecisionKind::kBrake};
   mail_.offer.publish();
+}
+
+void WatchdogProgram::run(SlotId, core::LaneExecutive& lane) noexcept {
+  const MonotonicTime now = lane.now();
+  const std::optional<SlotId> flight = flight_.overdue(now);
+  if (flight && flight_late_) lane.reactions().stop(*flight);
+  flight_late_ = flight.has_value();
+  const std::optional<SlotId> decision = decision_.overdue(now);
+  if (braking_ && !decision) {
+    lane.reactions().brake(*stalled_, false);
+    braking_ = false;
+  }
+  if (decision && decision_late_ && !braking_) {
+    lane.reactions().brake(*decision, true);
+    stalled_ = decision;
+    braking_ = true;
+    ++stalls_;
+  }
+  decision_late_ = decision.has_value();
 }
 
 void DecisionProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {

@@ -4,22 +4,27 @@
 
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "core/exchange/mailbox.hpp"
 #include "core/executive/lane_executive.hpp"
 #include "core/memory/static_vector.hpp"
 #include "firmware_if/depth_camera.hpp"
+#include "platform/app/aircraft.hpp"
 #include "platform/app/decision_pipeline.hpp"
 #include "platform/app/flight_lane.hpp"
-#include "platform/app/simulated_aircraft.hpp"
 
 namespace roborun::app {
 
-/// Flight lane to decision lane, every minor frame.
+/// Flight lane to decision lane, every minor frame. What is large is written only where it has changed since
+/// this cell of the mailbox was written last.
 struct FlightReport {
-  stages::Estimator estimator{stages::Estimator::Config{}};  ///< State and recent poses.
+  stages::EstimatedState state{};
+  bool estimated{false};  ///< There is a state.
+  stages::PastStates past{Nanos{0}};
   Trajectory committed{};
+  std::uint64_t committed_number{0};
   bool airborne{false};
 };
 
@@ -36,7 +41,7 @@ struct LaneMail {
 
 class FlightProgram final : public core::LaneProgram {
  public:
-  FlightProgram(FlightLane& flight, SimulatedAircraft& aircraft, LaneMail& mail)
+  FlightProgram(FlightLane& flight, Aircraft& aircraft, LaneMail& mail)
       : flight_(flight), aircraft_(aircraft), mail_(mail) {}
   /// A frame belongs to the instant of its release, however late it begins.
   void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override;
@@ -45,7 +50,7 @@ class FlightProgram final : public core::LaneProgram {
 
  private:
   FlightLane& flight_;
-  SimulatedAircraft& aircraft_;
+  Aircraft& aircraft_;
   LaneMail& mail_;
   std::uint64_t offers_refused_{0};
 };
@@ -83,6 +88,29 @@ class DecisionProgram final : public core::LaneProgram {
   std::uint64_t decisions_{0};
   std::uint64_t too_late_{0};
   std::atomic<bool> given_up_{false};
+};
+
+/// Twice in a row, so that a host which stops everything for a while does not count as a hang: a flight lane
+/// that is overdue ends the run; while the decision lane is, no new trajectory is taken and the committed one
+/// ends in its stop.
+class WatchdogProgram final : public core::LaneProgram {
+ public:
+  WatchdogProgram(const core::LaneExecutive& flight, const core::LaneExecutive& decision)
+      : flight_(flight), decision_(decision) {}
+  void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override;
+  /// Times that the decision lane hung; never decreases.
+  [[nodiscard]] std::uint64_t stalls() const noexcept { return stalls_; }
+  /// The slot in which it hung last.
+  [[nodiscard]] std::optional<core::SlotId> stalled() const noexcept { return stalled_; }
+
+ private:
+  const core::LaneExecutive& flight_;
+  const core::LaneExecutive& decision_;
+  bool flight_late_{false};
+  bool decision_late_{false};
+  bool braking_{false};
+  std::uint64_t stalls_{0};
+  std::optional<core::SlotId> stalled_;
 };
 
 }  // namespace roborun::app

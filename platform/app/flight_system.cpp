@@ -21,14 +21,14 @@ Trajectory take_off(const Vector3& ground_W, const Vector3& top_W, MonotonicTime
 }  // namespace
 
 FlightSystem::FlightSystem(const sitl::World& world, const MissionConfig& config, core::StageMeter& meter,
-                           SimulatedAircraft& aircraft,
-                           const std::array<firmware_if::DepthCamera*, kCameras>& cameras)
-    : cameras_(cameras), flight_({}, {}) {
+                           Aircraft& aircraft, const std::array<firmware_if::DepthCamera*, kCameras>& cameras)
+    : cameras_(cameras), flight_({}, {.period_s = seconds(config.minor_frame)}) {
   PipelineConfig pipeline;
   pipeline.flight_bounds_W = world.bounds_W();
   pipeline.map_bounds_W = {world.bounds_W().min_W - Vector3::Constant(kMapMargin_m),
                            world.bounds_W().max_W + Vector3::Constant(kMapMargin_m)};
   pipeline.horizon_m = config.camera.range_m - 1.0;
+  pipeline.minor_frame = config.minor_frame;
 
   const std::size_t cloud_bytes = stages::PointCloud::arena_bytes({});
   block_.resize(cloud_bytes + backend_bytes(pipeline.map_bounds_W, config.camera) + 4096);
@@ -50,7 +50,7 @@ FlightSystem::FlightSystem(const sitl::World& world, const MissionConfig& config
   g.sensor_volume_max_m3 =
       4.0 * config.camera.range_m * config.camera.range_m * std::min(height_m, 2.0 * config.camera.range_m);
   g.coarsest_level = coarsest_level_within(world.bounds_W().size().z() / 3.0);
-  g.minor_frame = core::kMinorFrame;
+  g.minor_frame = config.minor_frame;
   governor_.emplace(g);
   pipeline_.emplace(pipeline, meter, *governor_, *cloud_, *backends_.map, *backends_.planner, smoother_);
 

@@ -24,7 +24,7 @@ class FlightSystem {
   /// Takes all memory. Throws sitl::InputError for an unknown backend, or a world too large for the map. All
   /// references must outlive it.
   FlightSystem(const sitl::World& world, const MissionConfig& config, core::StageMeter& meter,
-               SimulatedAircraft& aircraft, const std::array<firmware_if::DepthCamera*, kCameras>& cameras);
+               Aircraft& aircraft, const std::array<firmware_if::DepthCamera*, kCameras>& cameras);
   FlightSystem(const FlightSystem&) = delete;
   FlightSystem& operator=(const FlightSystem&) = delete;
 

@@ -8,12 +8,12 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/executive/lane_executive.hpp"
-#include "core/executive/lane_meter.hpp"
 #include "core/geometry/math.hpp"
 #include "core/record/state_hash.hpp"
 #include "platform/app/camera_rig.hpp"
-#include "platform/app/flight_system.hpp"
+#include "platform/app/lockstep_flight.hpp"
+#include "platform/app/recording.hpp"
+#include "platform/app/simulated_aircraft.hpp"
 
 namespace roborun::app {
 namespace {
@@ -29,32 +29,24 @@ double quantile(std::vector<double> values, double q) {
   return values[static_cast<std::size_t>(std::ceil(at))];
 }
 
-/// One mission: the flight system under two virtual clocks, and the judge of what it does.
+/// One mission: a flight in lockstep, and the judge of what it does.
 class MissionRun {
  public:
   MissionRun(const sitl::World& world, const MissionConfig& config);
   report::MissionReport fly(const std::function<void(const Progress&)>& progress);
 
  private:
-  void step_lanes();
   void record_decision(const DecisionOutput& out);
   [[nodiscard]] const char* end_reason();
   void summarise(double wall_s);
 
   const sitl::World& world_;
   const MissionConfig& config_;
-  core::CostProfile costs_;  ///< What computing costs now.
-  bool slowed_{false};
-  MonotonicTime now_{};
   CameraRig rig_;
   SimulatedAircraft aircraft_;
-  core::VirtualClock flight_clock_;
-  core::VirtualClock decision_clock_;
-  core::CostProfileMeter meter_;
-  FlightSystem system_;
-  core::Reactions reactions_;
-  core::LaneExecutive flight_lane_;
-  core::LaneExecutive decision_lane_;
+  std::unique_ptr<FlightRecorder> recorder_;  ///< Null: nothing is recorded.
+  LockstepFlight flight_;
+  FlightSystem& system_;
 
   const char* give_up_{nullptr};  ///< Why the vehicle stops where it is.
   double best_distance_m_{1e300};
@@ -67,46 +59,22 @@ class MissionRun {
 MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
     : world_(world),
       config_(config),
-      costs_(config.costs),
       rig_(world, config.camera, config.seed),
-      aircraft_{sitl::Vehicle(config.vehicle, config.wind,
-                              Vector3(world.start_W().x(), world.start_W().y(), 0.0), config.seed),
-                sitl::NavigationSensors(config.sensors, config.seed), rig_, ActuatorLink(config.seed)},
-      meter_(costs_, decision_clock_),
-      system_(world, config, meter_, aircraft_, rig_.cameras()),
-      flight_lane_(core::LaneId::kFlight, flight_clock_, system_.flight_program(), reactions_, nullptr),
-      decision_lane_(core::LaneId::kDecision, decision_clock_, system_.decision_program(), reactions_,
-                     nullptr) {
-  meter_.attach(decision_lane_);
-  flight_lane_.start(MonotonicTime{core::kMinorFrame});
-  decision_lane_.start(MonotonicTime{core::kMinorFrame});
-}
-
-/// One minor frame of all lanes. A decision is computed at once from the inputs of its start; its last slot,
-/// the hand-over, waits until the board would have been ready.
-void MissionRun::step_lanes() {
-  now_ += core::kMinorFrame;
-  flight_clock_.set(now_);
-  flight_lane_.run_frame();
-  if (decision_lane_.in_frame() && decision_clock_.now() <= now_) decision_lane_.step();
-  if (decision_lane_.in_frame() || decision_lane_.release() > now_) return;
-  decision_clock_.set(now_);
-  if (!slowed_ && seconds(now_.time_since_epoch()) >= config_.slow_down_at_s) {
-    for (core::StageCost& cost : costs_.stage) cost = core::slower(cost, config_.slow_down_factor);
-    slowed_ = true;
-  }
-  const std::uint64_t before = system_.decision_program().decisions();
-  do decision_lane_.step();
-  while (decision_lane_.in_frame() && decision_lane_.next_slot() != core::SlotId::kHandOver);
-  if (system_.decision_program().decisions() > before) record_decision(system_.decision_program().output());
-}
+      aircraft_(world, config, rig_),
+      recorder_(config.record.empty() ? nullptr
+                                      : std::make_unique<FlightRecorder>(config.record, world, config,
+                                                                         aircraft_, rig_.cameras())),
+      flight_(world, config, recorder_ ? recorder_->aircraft() : aircraft_,
+              recorder_ ? recorder_->cameras() : rig_.cameras()),
+      system_(flight_.system()) {}
 
 void MissionRun::record_decision(const DecisionOutput& out) {
+  if (recorder_) recorder_->decided(out);
   const OperatingPoint& point = out.decision.point;
   report::DecisionRecord r;
-  r.time_s = seconds(now_.time_since_epoch());
-  r.p_WB = aircraft_.vehicle.state().p_WB;
-  r.speed_mps = aircraft_.vehicle.state().v_WB.norm();
+  r.time_s = seconds(flight_.now().time_since_epoch());
+  r.p_WB = aircraft_.vehicle().state().p_WB;
+  r.speed_mps = aircraft_.vehicle().state().v_WB.norm();
   r.p0_m = cell_size_m(point.p0_level);
   r.p1_m = cell_size_m(point.p1_level);
   r.v0_m3 = out.work[static_cast<std::size_t>(core::StageId::kMap)].volume_m3;
@@ -148,7 +116,7 @@ void MissionRun::record_decision(const DecisionOutput& out) {
 }
 
 const char* MissionRun::end_reason() {
-  const sitl::VehicleState& s = aircraft_.vehicle.state();
+  const sitl::VehicleState& s = aircraft_.vehicle().state();
   const double to_goal_m = (world_.goal_W() - s.p_WB).norm();
   // The vehicle's body, a sphere of half its span; the ground counts once it has left it.
   const double radius_m = PipelineConfig{}.vehicle_radius_m;
@@ -162,19 +130,21 @@ const char* MissionRun::end_reason() {
   }
   if (to_goal_m < best_distance_m_ - 0.5) {
     best_distance_m_ = to_goal_m;
-    best_at_ = now_;
+    best_at_ = flight_.now();
   }
   if (s.battery_ratio <= 0.0) return "battery_empty";
   if (give_up_ == nullptr) {
-    if (seconds(now_ - best_at_) > config_.no_progress_s) give_up_ = "no_path_to_goal";
-    if (seconds(now_.time_since_epoch()) > config_.time_limit_s) give_up_ = "time_limit";
-    if (give_up_ != nullptr) system_.decision_program().give_up();
+    if (seconds(flight_.now() - best_at_) > config_.no_progress_s) give_up_ = "no_path_to_goal";
+    if (seconds(flight_.now().time_since_epoch()) > config_.time_limit_s) give_up_ = "time_limit";
+    if (give_up_ == nullptr) return nullptr;
+    system_.decision_program().give_up();
+    if (recorder_) recorder_->gave_up();
     return nullptr;
   }
   // Given up: no more decisions; the committed trajectory ends in a stop, and the mission in a hover.
   const Trajectory& committed = system_.flight().committed();
-  const bool stopped =
-      now_ > committed.start_time + from_seconds(committed.duration_s()) && s.v_WB.norm() < kHover_mps;
+  const bool stopped = flight_.now() > committed.start_time + from_seconds(committed.duration_s()) &&
+                       s.v_WB.norm() < kHover_mps;
   return stopped ? give_up_ : nullptr;
 }
 
@@ -185,9 +155,9 @@ void MissionRun::summarise(double wall_s) {
   r.seed = config_.seed;
   r.map = config_.map_backend;
   r.planner = config_.planner_backend;
-  r.mission_time_s = seconds(now_.time_since_epoch());
+  r.mission_time_s = seconds(flight_.now().time_since_epoch());
   r.mean_velocity_mps = r.mission_time_s > 0.0 ? r.distance_m / r.mission_time_s : 0.0;
-  r.energy_kJ = 1e-3 * aircraft_.vehicle.state().energy_J;
+  r.energy_kJ = 1e-3 * aircraft_.vehicle().state().energy_J;
   r.decisions = report_.decisions.size();
   std::vector<double> precision_m;
   for (const report::DecisionRecord& d : report_.decisions) {
@@ -210,20 +180,22 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
   const double whole_m = (world_.goal_W() - world_.start_W()).norm();
   const char* reason = nullptr;
   for (std::uint64_t frame = 0; reason == nullptr; ++frame) {
-    const Vector3 before_W = aircraft_.vehicle.state().p_WB;
-    step_lanes();
-    const sitl::VehicleState& s = aircraft_.vehicle.state();
+    const Vector3 before_W = aircraft_.vehicle().state().p_WB;
+    if (const DecisionOutput* decision = flight_.step()) record_decision(*decision);
+    const sitl::VehicleState& s = aircraft_.vehicle().state();
     report_.result.distance_m += (s.p_WB - before_W).norm();
     report_.result.max_velocity_mps = std::max(report_.result.max_velocity_mps, s.v_WB.norm());
     hash_.add(s.p_WB);
     hash_.add(s.v_WB);
-    if (frame % 40 == 0) report_.path.push_back({seconds(now_.time_since_epoch()), s.p_WB, s.v_WB.norm()});
+    if (frame % 40 == 0)
+      report_.path.push_back({seconds(flight_.now().time_since_epoch()), s.p_WB, s.v_WB.norm()});
     if (frame % 400 == 0 && progress) {
-      progress({seconds(now_.time_since_epoch()),
+      progress({seconds(flight_.now().time_since_epoch()),
                 std::clamp(1.0 - (world_.goal_W() - s.p_WB).norm() / whole_m, 0.0, 1.0), s.v_WB.norm()});
     }
     reason = end_reason();
   }
+  if (recorder_) recorder_->finish(system_.map());
   report_.result.reason = reason;
   report_.pools = system_.pools();
   summarise(std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count());

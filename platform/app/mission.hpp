@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/executive/cost_profile.hpp"
+#include "core/executive/frame_table.hpp"
 #include "governor/policy/governor.hpp"
 #include "platform/report/mission_result.hpp"
 #include "platform/sitl/sensors/depth_camera.hpp"
@@ -25,6 +26,7 @@ struct MissionConfig {
   std::string map_backend{"own"};      ///< "own" or "octomap".
   std::string planner_backend{"own"};  ///< "own" or "ompl:NAME".
   double v_max_mps{6.0};
+  Nanos minor_frame{core::kMinorFrame};  ///< core::minor_frame_of() a legal rate.
   sitl::DepthCameraConfig camera{};
   sitl::NavigationSensorsConfig sensors{};
   sitl::VehicleConfig vehicle{};
@@ -33,6 +35,7 @@ struct MissionConfig {
       1e300};  ///< From then on computing takes slow_down_factor times as long: a throttled CPU.
   double slow_down_factor{1.0};
   double time_limit_s{7200.0};
+  std::string record;           ///< File for the recording of the flight; empty: none.
   double no_progress_s{120.0};  ///< Not nearer to the goal for so long: the mission is given up, hovering.
 };
 
@@ -45,7 +48,7 @@ struct Progress {
 /// Flies from the world's start (on the ground) to its goal. Deterministic: the same config, world and build
 /// give the same report, but for real_time_factor. `progress` (may be empty) is called about once a second of
 /// virtual time. result.env, mission and profile are left to the caller. Throws sitl::InputError for an
-/// unknown backend.
+/// unknown backend, and for a recording that cannot be written.
 [[nodiscard]] report::MissionReport fly_mission(const sitl::World& world, const MissionConfig& config,
                                                 const std::function<void(const Progress&)>& progress);
 

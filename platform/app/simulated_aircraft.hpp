@@ -1,8 +1,9 @@
 /// Vehicle, motors' bus and navigation sensors of a simulated flight, and who takes pictures on the way.
 #pragma once
 
-#include "core/executive/frame_table.hpp"
 #include "platform/app/actuator_link.hpp"
+#include "platform/app/aircraft.hpp"
+#include "platform/app/mission.hpp"
 #include "platform/sitl/sensors/navigation_sensors.hpp"
 #include "platform/sitl/vehicle/vehicle.hpp"
 
@@ -15,27 +16,48 @@ class ExposureSink {
   virtual void expose(MonotonicTime now, const Pose& X_WB) noexcept = 0;
 };
 
-struct SimulatedAircraft {
-  sitl::Vehicle vehicle;
-  sitl::NavigationSensors sensors;
-  ExposureSink& cameras;
-  ActuatorLink actuators;
-  MonotonicTime now{};
+class SimulatedAircraft final : public Aircraft {
+ public:
+  /// On the ground below the start of `world`, which must outlive it as `cameras` must.
+  SimulatedAircraft(const sitl::World& world, const MissionConfig& config, ExposureSink& cameras)
+      : vehicle_(config.vehicle, config.wind, Vector3(world.start_W().x(), world.start_W().y(), 0.0),
+                 config.seed),
+        sensors_(config.sensors, config.seed),
+        cameras_(cameras),
+        actuators_(config.seed, config.minor_frame),
+        minor_frame_(config.minor_frame) {}
 
-  /// The world moves on in whole minor frames until `time`: more than one after frames that slipped, at most
-  /// 40 (0.1 s) a call.
-  void fly_to(MonotonicTime time) noexcept {
-    for (int i = 0; i < 40 && now < time; ++i) {
+  /// Its time begins here.
+  void start(MonotonicTime now) noexcept { now_ = now; }
+  /// The world moves on in whole minor frames until `now`: more than one after frames that slipped, at most
+  /// 40 a call.
+  void begin_frame(MonotonicTime now) noexcept override {
+    for (int i = 0; i < 40 && now_ < now; ++i) {
       // What was sent at the end of a minor frame reaches the motors in the middle of the next one: four
       // throttles are on the bus for 0.13 ms, and an ESC has a cycle of its own.
-      vehicle.step(core::kMinorFrame / 2);
-      actuators.advance(now + core::kMinorFrame / 2, vehicle);
-      vehicle.step(core::kMinorFrame / 2);
-      now += core::kMinorFrame;
-      sensors.sample(now, vehicle.state());
-      cameras.expose(now, vehicle.X_WB());
+      vehicle_.step(minor_frame_ / 2);
+      actuators_.advance(now_ + minor_frame_ / 2, vehicle_);
+      vehicle_.step(minor_frame_ / 2);
+      now_ += minor_frame_;
+      sensors_.sample(now_, vehicle_.state());
+      cameras_.expose(now_, vehicle_.X_WB());
     }
   }
+  [[nodiscard]] firmware_if::Imu& imu() noexcept override { return sensors_; }
+  [[nodiscard]] firmware_if::Gnss& gnss() noexcept override { return sensors_; }
+  [[nodiscard]] firmware_if::Barometer& barometer() noexcept override { return sensors_; }
+  [[nodiscard]] firmware_if::Motors& motors() noexcept override { return actuators_; }
+  void end_frame(MonotonicTime now) noexcept override { actuators_.step(now); }
+
+  [[nodiscard]] const sitl::Vehicle& vehicle() const noexcept { return vehicle_; }
+
+ private:
+  sitl::Vehicle vehicle_;
+  sitl::NavigationSensors sensors_;
+  ExposureSink& cameras_;
+  ActuatorLink actuators_;
+  Nanos minor_frame_;
+  MonotonicTime now_{};
 };
 
 }  // namespace roborun::app

@@ -57,7 +57,8 @@ std::vector<std::string> why_not_real_time() {
   pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
   pthread_attr_setschedpolicy(&attributes, SCHED_FIFO);
   sched_param param{};
-  param.sched_priority = core::lane(core::LaneId::kFlight).priority;
+  for (const core::LaneSpec& spec : core::kLanes)
+    param.sched_priority = std::max(param.sched_priority, spec.priority);
   pthread_attr_setschedparam(&attributes, &param);
   pthread_attr_setstacksize(&attributes, kProbeStack_bytes);
   pthread_t probe{};

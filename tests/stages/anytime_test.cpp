@@ -23,6 +23,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::uint64_t kNever = std::numeric_limits<std::uint64_t>::max();
 constexpr std::uint64_t kInterval = 1024;  // of the contract of StageBudget
 constexpr std::uint64_t kOneBox = 1024;    // lookups of one question to the map
+constexpr std::uint64_t kSpare = 4096;     // of the planner: for a way at all, and to shorten it
 constexpr int kPixels = 64;
 
 /// Spent after so many polls; notes how far apart they were, and what was done when it said so.
@@ -201,7 +202,7 @@ TEST_F(Anytime, Planner) {
           }
           return {status, result.work};
         },
-        kInterval + kOneBox, kInterval);
+        kSpare + kInterval + kOneBox, 2 * (kSpare + kInterval + kOneBox));
   }
 }
 
