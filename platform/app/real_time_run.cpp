@@ -165,6 +165,7 @@ void RealTimeRun::start_threads() {
     if (!fifo) placement_[i].priority = 0;
     lane_[i].start(first, minor_frame);
     const std::string error = thread_[i].start(placement_[i], true);
+    over_.store(!error.empty(), std::memory_order_relaxed);  // the lanes that run must end
     if (!error.empty()) throw sitl::InputError(error);
   }
 }
