@@ -11,9 +11,9 @@
 namespace roborun::core {
 
 /// flight: fixed minor frame. decision: its frame is the granted deadline, in whole minor frames. background:
-/// not real-time.
-enum class LaneId : std::uint8_t { kFlight, kDecision, kBackground };
-inline constexpr std::size_t kLaneCount = 3;
+/// not real-time. watchdog: looks whether the first two still come round.
+enum class LaneId : std::uint8_t { kFlight, kDecision, kBackground, kWatchdog };
+inline constexpr std::size_t kLaneCount = 4;
 
 /// What happens when a slot takes longer than its budget, `overruns_to_act` times in a row.
 enum class OverrunPolicy : std::uint8_t {
@@ -38,14 +38,16 @@ enum class SlotId : std::uint8_t {
   kSmoother,
   kHandOver,
   kCameras,
+  kWatch,
 };
-inline constexpr std::size_t kSlotCount = 14;
+inline constexpr std::size_t kSlotCount = 15;
 
 struct LaneSpec {
   LaneId id;
   const char* name;
-  Nanos period;           ///< Between releases; the decision lane's program sets each frame's own.
-  Nanos quantum;          ///< Releases lie on a grid of this, counted from the first one.
+  /// Between releases, which lie on a grid of this, counted from the first one; the decision lane's program
+  /// makes its frames whole multiples. kMinorFrame stands for the run's own.
+  Nanos period;
   int priority;           ///< SCHED_FIFO, 0: not real-time.
   std::size_t cpu_index;  ///< Among the CPUs that the process may use, counted from the last one.
   std::size_t stack_bytes;
@@ -61,7 +63,21 @@ struct SlotSpec {
   bool is_stage;  ///< What is not a stage is the executive's own work, and is reported as its overhead.
 };
 
+/// How long after the end of its budget a slot that still runs, or a lane that has not woken up, is overdue.
+inline constexpr Nanos kWatchdogPatience{100'000'000};
+
+/// Of the flight lane, unless a run asks for another rate.
 inline constexpr Nanos kMinorFrame{2'500'000};
+
+/// The rates at which the flight lane may run: 100 to 400 Hz with a minor frame of whole microseconds, hence
+/// 100, 125, 160, 200, 250, 320 and 400. No faster: the budgets below fill half of 2.5 ms, ESC commands leave
+/// at 400 Hz at most (firmware_if/transmit_gate.hpp), and the estimator remembers 200 samples. No slower: not
+/// flown (Mission.FliesAtEveryRateOfTheFlightLane).
+[[nodiscard]] constexpr bool is_flight_rate(int rate_Hz) noexcept {
+  return rate_Hz >= 100 && rate_Hz <= 400 && 1'000'000 % rate_Hz == 0;
+}
+/// Precondition: is_flight_rate(rate_Hz).
+[[nodiscard]] constexpr Nanos minor_frame_of(int rate_Hz) noexcept { return Nanos{1'000'000'000 / rate_Hz}; }
 
 namespace frame_table_units {
 constexpr Nanos us(std::int64_t n) noexcept { return Nanos{n * 1000}; }
@@ -73,10 +89,11 @@ constexpr std::size_t kib(std::size_t n) noexcept { return n * 1024; }
 inline constexpr std::array<LaneSpec, kLaneCount> kLanes = [] {
   using namespace frame_table_units;
   return std::array<LaneSpec, kLaneCount>{{
-    // lane                  name          period       quantum      priority  cpu  stack
-    {LaneId::kFlight,       "flight",      kMinorFrame, kMinorFrame,       80,   0, kib(256)},
-    {LaneId::kDecision,     "decision",    kMinorFrame, kMinorFrame,       60,   1, kib(512)},
-    {LaneId::kBackground,   "background",  ms(5),       ms(5),              0,   1, kib(256)},
+    // lane                  name          period       priority  cpu  stack
+    {LaneId::kFlight,       "flight",      kMinorFrame,       80,   0, kib(256)},
+    {LaneId::kDecision,     "decision",    kMinorFrame,       60,   1, kib(512)},
+    {LaneId::kBackground,   "background",  ms(5),              0,   1, kib(256)},
+    {LaneId::kWatchdog,     "watchdog",    ms(20),            90,   1, kib(64)},   // above them all, beside the decision lane
   }};
 }();
 
@@ -102,6 +119,8 @@ inline constexpr std::array<SlotSpec, kSlotCount> kFrameTable = [] {
     {SlotId::kHandOver,    "hand_over",    L::kDecision,    ms(5),   P::kBrake,      3, false},  // offers the result
 
     {SlotId::kCameras,     "cameras",      L::kBackground,  ms(400), P::kDegrade,    1, true},   // simulator, log
+
+    {SlotId::kWatch,       "watch",         L::kWatchdog,    us(200), P::kSkip,       1, false},
   }};
 }();
 // clang-format on
@@ -128,7 +147,7 @@ inline constexpr std::array<SlotSpec, kSlotCount> kFrameTable = [] {
     if (s.lane == LaneId::kFlight) flight += s.budget;
   }
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    if (static_cast<std::size_t>(kLanes[i].id) != i || kLanes[i].quantum <= Nanos{0}) return false;
+    if (static_cast<std::size_t>(kLanes[i].id) != i || kLanes[i].period <= Nanos{0}) return false;
   }
   return flight <= kMinorFrame && slot_of(StageId::kSmoother) == SlotId::kSmoother;
 }

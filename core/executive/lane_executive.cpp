@@ -34,16 +34,29 @@ LaneExecutive::LaneExecutive(LaneId id, const firmware_if::Clock& clock, LanePro
   start(MonotonicTime{});
 }
 
-void LaneExecutive::start(MonotonicTime first_release) noexcept {
+void LaneExecutive::start(MonotonicTime first_release, Nanos minor_frame) noexcept {
+  grid_ = lane(id_).period == kMinorFrame ? minor_frame : lane(id_).period;
   release_ = first_release;
   in_frame_ = false;
+  expect(kFrameTable[first_].id, release_);
+}
+
+void LaneExecutive::expect(SlotId slot, MonotonicTime due) noexcept {
+  expected_.store(16 * due.time_since_epoch().count() + static_cast<std::int64_t>(slot),
+                  std::memory_order_release);
+}
+
+std::optional<SlotId> LaneExecutive::overdue(MonotonicTime now) const noexcept {
+  const std::int64_t expected = expected_.load(std::memory_order_acquire);
+  if (now <= MonotonicTime{Nanos{expected / 16}} + kWatchdogPatience) return std::nullopt;
+  return static_cast<SlotId>(expected % 16);
 }
 
 void LaneExecutive::begin_frame() noexcept {
   if (!awake_) woke_ = clock_.now();
   awake_ = false;
   lane_.jitter.add(woke_ - release_);
-  period_ = lane(id_).period;
+  period_ = grid_;
   at_ = 0;
   in_frame_ = true;
   ending_ = false;
@@ -64,6 +77,7 @@ void LaneExecutive::charge_to(SlotId id) noexcept {
   Present& present = now_[index(id)];
   if (!present.ran) present.begin = now;
   present.ran = true;
+  expect(id, now + present.budget - present.spent);
 }
 
 Nanos LaneExecutive::spent(SlotId id) const noexcept {
@@ -74,13 +88,13 @@ Nanos LaneExecutive::grant(SlotId id, Nanos wanted) noexcept {
   Present& present = now_[index(id)];
   const Nanos cut = degrade_next_[index(id)] ? wanted / 2 : wanted;
   present.budget = std::max(std::min(present.budget, cut), Nanos{1});
+  if (id == charged_) expect(id, mark_ + present.budget - present.spent);
   return present.budget;
 }
 
 void LaneExecutive::set_period(Nanos period) noexcept {
-  const Nanos quantum = lane(id_).quantum;
-  const std::int64_t whole = (period.count() + quantum.count() - 1) / quantum.count();
-  period_ = std::max<std::int64_t>(whole, 1) * quantum;
+  const std::int64_t whole = (period.count() + grid_.count() - 1) / grid_.count();
+  period_ = std::max<std::int64_t>(whole, 1) * grid_;
 }
 
 void LaneExecutive::step() noexcept {
@@ -156,14 +170,14 @@ void LaneExecutive::finish_frame() noexcept {
   if (end > due) ++lane_.deadline_misses;
   lane_.response.add(end - release_);
   lane_.overhead.add((end - woke_) - of_stages);
-  const Nanos quantum = lane(id_).quantum;
   MonotonicTime next = due;
   if (end > due) {
-    const std::int64_t late = ((end - due).count() + quantum.count() - 1) / quantum.count();
+    const std::int64_t late = ((end - due).count() + grid_.count() - 1) / grid_.count();
     lane_.slips += static_cast<std::uint64_t>(late);
-    next += late * quantum;
+    next += late * grid_;
   }
   release_ = next;
+  expect(kFrameTable[first_].id, release_);
 }
 
 }  // namespace roborun::core

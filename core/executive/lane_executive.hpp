@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "core/exchange/spsc_ring.hpp"
 #include "core/executive/frame_table.hpp"
@@ -57,7 +58,8 @@ class LaneExecutive {
   LaneExecutive(LaneId id, const firmware_if::Clock& clock, LaneProgram& program, Reactions& reactions,
                 TraceRing* trace) noexcept;
 
-  void start(MonotonicTime first_release) noexcept;
+  /// `minor_frame`: the period of the flight and the decision lane in this run.
+  void start(MonotonicTime first_release, Nanos minor_frame = kMinorFrame) noexcept;
   /// Of the frame in progress, or of the next one.
   [[nodiscard]] MonotonicTime release() const noexcept { return release_; }
   [[nodiscard]] bool in_frame() const noexcept { return in_frame_; }
@@ -88,10 +90,15 @@ class LaneExecutive {
   Nanos grant(SlotId id, Nanos wanted) noexcept;
   /// What the slot worked on: kept with its longest time.
   void describe(SlotId id, const Work& work) noexcept { now_[index(id)].work = work; }
-  /// Until the release after this frame. Rounded up to whole quanta, at least one.
+  /// Until the release after this frame. Rounded up to whole periods of the lane, at least one.
   void set_period(Nanos period) noexcept;
   /// The other slots of this frame are not run.
   void end_frame() noexcept { ending_ = true; }
+
+  /// Any thread: the slot in which the lane hangs at `now`, kWatchdogPatience after that slot's budget was
+  /// spent (its frame has not ended: nothing else has blamed it yet), or after the frame that it begins was
+  /// due.
+  [[nodiscard]] std::optional<SlotId> overdue(MonotonicTime now) const noexcept;
 
   [[nodiscard]] LaneId id() const noexcept { return id_; }
   [[nodiscard]] Reactions& reactions() const noexcept { return reactions_; }
@@ -111,8 +118,11 @@ class LaneExecutive {
   void begin_frame() noexcept;
   void finish_frame() noexcept;
   void judge(const SlotSpec& spec, const Present& present) noexcept;
+  /// Tells overdue() that `slot` is to be done by `due`.
+  void expect(SlotId slot, MonotonicTime due) noexcept;
 
   static constexpr std::size_t kMostSlots = 8;
+  static_assert(kSlotCount <= 16, "expected_ has four bits for the slot");
   LaneId id_;
   const firmware_if::Clock& clock_;
   LaneProgram& program_;
@@ -121,9 +131,10 @@ class LaneExecutive {
   std::size_t first_{0};
   std::size_t count_{0};
 
+  Nanos grid_{};  ///< Of the releases.
   MonotonicTime release_{};
   MonotonicTime woke_{};
-  Nanos period_{};
+  Nanos period_{};  ///< Of this frame.
   std::size_t at_{0};
   bool in_frame_{false};
   bool awake_{false};
@@ -136,6 +147,7 @@ class LaneExecutive {
   std::array<bool, kMostSlots> degrade_next_{};
   std::array<SlotStatistics, kMostSlots> slot_{};
   LaneStatistics lane_{};
+  std::atomic<std::int64_t> expected_{0};  ///< 16 * the instant in ns + the slot.
 };
 
 }  // namespace roborun::core

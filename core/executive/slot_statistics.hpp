@@ -75,7 +75,8 @@ struct LaneStatistics {
   DurationHistogram jitter{};    ///< From release to wake-up.
   DurationHistogram overhead{};  ///< Of a frame, all that no stage used.
   DurationHistogram response{};  ///< From release to the end of the frame.
-  /// Never decrease. slips: quanta of the lane's grid that had no frame because the one before ran into them.
+  /// Never decrease. slips: releases of the lane's grid that had no frame because the one before ran into
+  /// them.
   std::uint64_t frames{0}, slips{0}, deadline_misses{0};
 };
 

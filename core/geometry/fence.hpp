@@ -41,15 +41,26 @@ class Fence {
  public:
   static constexpr std::size_t kMaxAreas = 16;
   static constexpr std::size_t kMaxPoints = 32;
+  struct Area {
+    FenceSide side{FenceSide::kKeepIn};
+    double radius_m{0.0};  ///< Above 0: a circle around point 0.
+    std::size_t count{0};
+    std::array<FencePoint, kMaxPoints> point{};
+  };
 
   /// Points in either direction, the last one is joined to the first. O(points^2), for start-up.
   [[nodiscard]] FenceFault add_polygon(FenceSide side, std::span<const FencePoint> points) noexcept;
   [[nodiscard]] FenceFault add_circle(FenceSide side, const FencePoint& center, double radius_m) noexcept;
   [[nodiscard]] FenceFault set_altitude(double lowest_m, double highest_m) noexcept;
 
-  [[nodiscard]] bool empty() const noexcept {
-    return areas_.empty() && lowest_m_ == -kNoLimit && highest_m_ == kNoLimit;
+  [[nodiscard]] bool empty() const noexcept { return areas_.empty() && !limits_altitude(); }
+  /// What was added so far, in this order.
+  [[nodiscard]] std::span<const Area> areas() const noexcept { return {areas_.begin(), areas_.size()}; }
+  [[nodiscard]] bool limits_altitude() const noexcept {
+    return lowest_m_ != -kNoLimit || highest_m_ != kNoLimit;
   }
+  [[nodiscard]] double lowest_m() const noexcept { return lowest_m_; }
+  [[nodiscard]] double highest_m() const noexcept { return highest_m_; }
   /// False for NaN. RT-safe, as the next two: O(points), no allocation.
   [[nodiscard]] bool allows(const Vector3& p_W) const noexcept { return allows(Aabb{p_W, p_W}); }
   /// True if every point of the closed box is permitted; false for an empty or non-finite box.
@@ -61,12 +72,6 @@ class Fence {
 
  private:
   static constexpr double kNoLimit = std::numeric_limits<double>::infinity();
-  struct Area {
-    FenceSide side{FenceSide::kKeepIn};
-    double radius_m{0.0};  ///< Above 0: a circle around point 0.
-    std::size_t count{0};
-    std::array<FencePoint, kMaxPoints> point{};
-  };
   struct Rectangle {
     double x0_m{}, x1_m{}, y0_m{}, y1_m{};
   };

@@ -10,11 +10,11 @@ constexpr std::uint8_t kFirstEscNode = 21;
 
 }  // namespace
 
-ActuatorLink::ActuatorLink(std::uint64_t seed) noexcept
+ActuatorLink::ActuatorLink(std::uint64_t seed, Nanos minor_frame) noexcept
     : bus_(kBitrate_bps, seed),
       port_(bus_.port(0)),
-      gate_({}, port_),
-      node_({}, gate_, port_, sessions_),
+      gate_({.beat_timeout = 3 * minor_frame}, port_),
+      node_({.command_period = minor_frame}, gate_, port_, sessions_),
       escs_{{{{.node_id = kFirstEscNode, .index = 0}, bus_.port(1)},
              {{.node_id = kFirstEscNode + 1, .index = 1}, bus_.port(2)},
              {{.node_id = kFirstEscNode + 2, .index = 2}, bus_.port(3)},

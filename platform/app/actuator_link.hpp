@@ -19,7 +19,8 @@ namespace roborun::app {
 /// simulation. No allocation after construction.
 class ActuatorLink final : public firmware_if::Motors {
  public:
-  explicit ActuatorLink(std::uint64_t seed) noexcept;
+  /// The gate closes after three minor frames without a command.
+  ActuatorLink(std::uint64_t seed, Nanos minor_frame) noexcept;
   ActuatorLink(const ActuatorLink&) = delete;
   ActuatorLink& operator=(const ActuatorLink&) = delete;
 

@@ -23,6 +23,7 @@ using sitl::InputError;
 
 struct Options {
   double seconds{60.0};
+  int rate_Hz{400};
   std::string env{"14"};
   std::uint64_t seed{1};
   bool load{false};
@@ -56,7 +57,7 @@ int compare(const Options& options) {
   return result.worse.empty() ? 0 : 1;
 }
 
-/// SLOT:MILLISECONDS, in every frame from the 4000th (10 s) of the flight lane or the 400th of others on.
+/// SLOT:MILLISECONDS, in every run of the slot from the 400th of the flight lane or the 5th of others on.
 std::optional<Injection> injection_of(const std::string& text) {
   if (text.empty()) return std::nullopt;
   const std::size_t colon = text.find(':');
@@ -66,7 +67,8 @@ std::optional<Injection> injection_of(const std::string& text) {
     if (colon == std::string::npos || text.substr(0, colon) != spec.name || end == nullptr || *end != '\0' ||
         !(ms > 0.0 && ms <= 3.6e6))
       continue;
-    return Injection{spec.id, from_seconds(1e-3 * ms), 400, UINT64_MAX, false};
+    const std::uint64_t from = spec.lane == core::LaneId::kFlight ? 400 : 5;
+    return Injection{spec.id, from_seconds(1e-3 * ms), from, UINT64_MAX, false};
   }
   throw InputError(
       fmt::format("--inject-spin: '{}' must be SLOT:MILLISECONDS, with a slot of the frame table", text));
@@ -76,6 +78,12 @@ int audit(const Options& options) {
   if (!options.compare.empty()) return compare(options);
   if (!(options.seconds >= 1.0 && options.seconds <= 86400.0))
     throw InputError(fmt::format("--seconds: {} is out of range: must be from 1 to 86400", options.seconds));
+  if (!core::is_flight_rate(options.rate_Hz))
+    throw InputError(
+        fmt::format("--rate: {} Hz: must be 100 to 400 Hz with a minor frame of whole microseconds: 100, "
+                    "125, 160, 200, 250, "
+                    "320 or 400",
+                    options.rate_Hz));
   const sitl::NamedEnvironment environment = sitl::environment(options.env);
   const sitl::World world = sitl::generate(environment.knobs, sitl::Mission::kPackageDelivery, options.seed);
   std::string note;
@@ -85,6 +93,7 @@ int audit(const Options& options) {
   config.mission.costs = profile.costs;
   config.mission.model = profile.model;
   config.mission.seed = options.seed;
+  config.mission.minor_frame = core::minor_frame_of(options.rate_Hz);
   config.seconds = options.seconds;
   config.best_effort = options.best_effort;
   config.load = options.load;
@@ -125,6 +134,9 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
       "there "
       "was one, 2 bad input, or no real time to be had here.");
   command->add_option("--seconds", options->seconds, "How long, 1 .. 86400")->capture_default_str();
+  command
+      ->add_option("--rate", options->rate_Hz, "Of the flight lane, Hz: 100, 125, 160, 200, 250, 320 or 400")
+      ->capture_default_str();
   command->add_option("--env", options->env, "Environment to fly in: 1 .. 27, or a name")
       ->capture_default_str();
   command->add_option("--seed", options->seed, "Seed of world, noise, wind and planner")
@@ -142,9 +154,9 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
       ->add_option("--tolerance", options->tolerance_ratio,
                    "With --compare: worse is more than so many times")
       ->capture_default_str();
-  command->add_option(
-      "--inject-spin", options->spin,
-      "A fault: SLOT:MILLISECONDS, busy in that slot in every frame from its lane's 400th on");
+  command->add_option("--inject-spin", options->spin,
+                      "A fault: SLOT:MILLISECONDS, busy in every run of that slot from the 400th (flight "
+                      "lane) or the 5th on");
   command->callback([options, &run] { run = [options] { return audit(*options); }; });
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/executive/frame_table.hpp"
 #include "core/memory/static_vector.hpp"
 #include "stages/planning/fenced_view.hpp"
 
@@ -64,8 +63,8 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   const double r_m = radius_m();
   const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m),
                         config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
-  profile_space({}, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W,
-                relevant_W, r_m, out.profile, work.units);
+  (void)profile_space({}, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W,
+                      relevant_W, r_m, out.profile, budget, work);
   out.profile.sensor_volume_m3 = cloud_.seen_volume_m3();
   // What the map will hold once this decision's images are in it.
   out.profile.map_volume_m3 = map_.known_volume_m3() + cloud_.seen_volume_m3();
@@ -168,7 +167,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
     out.kind = DecisionKind::kNew;
     out.trajectory = smoothed.trajectory;
   } else if (committed_until_s < 1e300) {
-    const MonotonicTime soonest = in.now + out.latency + core::kMinorFrame;
+    const MonotonicTime soonest = in.now + out.latency + config_.minor_frame;
     const TrajectoryPoint then = in.committed->at(soonest);
     Trajectory stop;
     if (then.v_W.norm() > 0.05 &&

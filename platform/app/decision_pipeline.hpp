@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/executive/frame_table.hpp"
 #include "core/executive/stage_budget.hpp"
 #include "core/executive/stage_meter.hpp"
 #include "core/geometry/fence.hpp"
@@ -26,7 +27,8 @@ struct PipelineConfig {
   double inflation_m{0.3};
   double horizon_m{24.0};  ///< No way-point farther than this: one metre less than the cameras see.
   double acceleration_mps2{4.0};
-  core::Fence fence{};  ///< What it forbids is occupied for planner and smoother.
+  core::Fence fence{};                   ///< What it forbids is occupied for planner and smoother.
+  Nanos minor_frame{core::kMinorFrame};  ///< Of the flight lane: no stop takes over sooner.
   Aabb map_bounds_W{};  ///< What the map stores; its heights limit what counts as seen volume.
 };
 

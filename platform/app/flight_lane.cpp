@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "core/executive/frame_table.hpp"
 #include "core/geometry/math.hpp"
 
 namespace roborun::app {
@@ -64,6 +63,7 @@ void FlightLane::commit(MonotonicTime now) {
   if (!flying_) {
     if (now - *first_estimate_ < kSettle || !may_take_off_) return;
     committed_ = take_off_(state.p_WB, now);
+    ++committed_number_;
     flying_ = true;
     home_W_ = committed_.end_W();
     ground_m_ = state.p_WB.z();
@@ -73,6 +73,7 @@ void FlightLane::commit(MonotonicTime now) {
   if (braking_ || descending_) offered_.reset();
   if (offered_ && offered_->start_time <= now) {
     committed_ = *offered_;
+    ++committed_number_;
     offered_.reset();
   }
 }
@@ -111,6 +112,7 @@ void FlightLane::descend(MonotonicTime now, double speed_mps) {
       straight_down(from_W - Vector3(0.0, 0.0, fast_m), kNearGround_m + kBelowGround_m, kTouchdown_mps);
   down.brake_begin_s = down.duration_s();
   committed_ = down;
+  ++committed_number_;
   braking_ = false;
   descending_ = true;
   moving_ = now;
@@ -119,19 +121,19 @@ void FlightLane::descend(MonotonicTime now, double speed_mps) {
 TrajectoryPoint FlightLane::next_reference(MonotonicTime now) {
   if (!braking_) return committed_.at(now);
   // The same curve at a rate that falls to zero: p = c(s), v = c' s', a = c'' s'^2 + c' s''.
-  constexpr double kDt_s = 1e-9 * static_cast<double>(core::kMinorFrame.count());
-  if (brake_at_s_ < 0.0) brake_at_s_ = seconds(now - committed_.start_time) - kDt_s;
+  if (brake_at_s_ < 0.0) brake_at_s_ = seconds(now - committed_.start_time) - period_s_;
   const double rate = brake_rate_;
   const double speed_mps = committed_.at_s(brake_at_s_).v_W.norm();
-  brake_rate_ = std::max(rate - kDt_s * kBrake_mps2 / std::max(speed_mps, 1.0), 0.0);
-  brake_at_s_ += kDt_s * brake_rate_;
+  brake_rate_ = std::max(rate - period_s_ * kBrake_mps2 / std::max(speed_mps, 1.0), 0.0);
+  brake_at_s_ += period_s_ * brake_rate_;
   TrajectoryPoint point = committed_.at_s(brake_at_s_);
   if (brake_rate_ <= 0.0 || brake_at_s_ >= committed_.duration_s()) {
     committed_ = Trajectory::hold(point.p_W, now);
+    ++committed_number_;
     braking_ = false;
     return committed_.at(now);
   }
-  const double slowing = (brake_rate_ - rate) / kDt_s;
+  const double slowing = (brake_rate_ - rate) / period_s_;
   const double r = brake_rate_;
   point.j_W = Vector3(r * r * r * point.j_W + 3.0 * r * slowing * point.a_W);
   point.a_W = Vector3(r * r * point.a_W + slowing * point.v_W);

@@ -19,7 +19,7 @@ class FlightLane {
   using TakeOff = std::function<Trajectory(const Vector3& ground_W, MonotonicTime start)>;
 
   FlightLane(const stages::Estimator::Config& estimator, const stages::Tracker::Config& tracker)
-      : estimator_(estimator), tracker_(tracker) {}
+      : estimator_(estimator), tracker_(tracker), period_s_(tracker.period_s) {}
 
   /// Makes the climb to the first hover; flown as soon as the estimator has settled.
   void set_take_off(TakeOff take_off) { take_off_ = std::move(take_off); }
@@ -43,6 +43,8 @@ class FlightLane {
   }
 
   [[nodiscard]] const Trajectory& committed() const { return committed_; }
+  /// Another number for each committed trajectory; 0 before the first.
+  [[nodiscard]] std::uint64_t committed_number() const { return committed_number_; }
   [[nodiscard]] const stages::Estimator& estimator() const { return estimator_; }
   [[nodiscard]] const stages::Tracker& tracker() const { return tracker_; }
   /// The climb is over: decisions may begin.
@@ -79,8 +81,10 @@ class FlightLane {
 
   stages::Estimator estimator_;
   stages::Tracker tracker_;
+  double period_s_;  ///< The minor frame.
   TakeOff take_off_;
   Trajectory committed_{};
+  std::uint64_t committed_number_{0};
   std::optional<Trajectory> offered_;
   firmware_if::MotorCommand command_{};
   std::optional<MonotonicTime> first_estimate_;

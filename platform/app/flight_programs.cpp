@@ -24,10 +24,11 @@ constexpr double kHome_m = 1.0;
 constexpr double kAtSite_m = 0.7;
 constexpr double kDescent_mps = 1.0;
 constexpr double kBlindDescent_mps = 0.5;
-constexpr Nanos kSitePatience{10'000'000'000};         // until it comes down blindly ...
-constexpr Nanos kStandPatience{20'000'000'000};        // ... also if it cannot stand still
-constexpr Nanos kReportDelay = 4 * core::kMinorFrame;  // at most, from a commit to its report
-constexpr Nanos kIdlePeriod{100'000'000};              // of reports while there is nothing to decide
+constexpr Nanos kSitePatience{10'000'000'000};   // until it comes down blindly ...
+constexpr Nanos kStandPatience{20'000'000'000};  // ... also if it cannot stand still
+constexpr int kReportDelay = 4;                  // minor frames at most, from a commit to its report
+constexpr Nanos kIdlePeriod{100'000'000};        // of reports while there is nothing to decide
+constexpr Nanos kLatestStop{20'000'000};         // 12 cm at 6 m/s
 
 }  // namespace
 
@@ -35,10 +36,10 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
   const MonotonicTime now = lane.release();
   switch (slot) {
     case SlotId::kWorld:
-      aircraft_.fly_to(now);
+      aircraft_.begin_frame(now);
       return;
     case SlotId::kSense:
-      flight_.sense(aircraft_.sensors, aircraft_.sensors, aircraft_.sensors);
+      flight_.sense(aircraft_.imu(), aircraft_.gnss(), aircraft_.barometer());
       return;
     case SlotId::kCommit:
       guard(now);
@@ -46,13 +47,17 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
       flight_.commit(now);
       return;
     case SlotId::kTrack:
-      flight_.track(now, aircraft_.actuators);
-      aircraft_.actuators.step(now);
+      flight_.track(now, aircraft_.motors());
+      aircraft_.end_frame(now);
       return;
     case SlotId::kPublish: {
       FlightReport& report = mail_.report.draft();
-      report.estimator = flight_.estimator();
-      report.committed = flight_.committed();
+      report.estimated = flight_.estimator().state(report.state) == Status::kOk;
+      report.past.catch_up(flight_.estimator().past());
+      if (report.committed_number != flight_.committed_number()) {
+        report.committed = flight_.committed();
+        report.committed_number = flight_.committed_number();
+      }
       report.airborne = flight_.airborne();
       report.action = action_;
       report.standing = flight_.standing(now);
@@ -80,12 +85,13 @@ void FlightProgram::take_offers(MonotonicTime now, const core::LaneExecutive& la
 
 FailsafeMeasures FlightProgram::measure(MonotonicTime now) noexcept {
   FailsafeMeasures m;
-  m.battery_used_ratio = 1.0 - aircraft_.battery_ratio();
+  const AircraftHealth health = aircraft_.health(now);
+  m.battery_used_ratio = 1.0 - health.battery_ratio;
   m.gnss_age_s = seconds(now - flight_.last_fix());
-  m.esc_silence_s = seconds(aircraft_.actuators.esc_silence(now));
-  if (aircraft_.hears_operator()) operator_heard_ = now;
+  m.esc_silence_s = seconds(health.esc_silence);
+  if (health.hears_operator) operator_heard_ = now;
   m.link_silence_s = seconds(now - operator_heard_);
-  m.killed = aircraft_.actuators.killed() ? 1.0 : 0.0;
+  m.killed = health.killed ? 1.0 : 0.0;
   if (const DecisionReport& d = mail_.decision.read(); d.heard) {
     m.depth_age_s = d.depth_age_s;
     m.planner_failures = d.failures;
@@ -109,7 +115,7 @@ void FlightProgram::guard(MonotonicTime now) noexcept {
   (void)mail_.decision.take();
   if (phase_ == Phase::kGround && flight_.flying()) phase_ = Phase::kTakeOff;
   if (phase_ == Phase::kTakeOff && flight_.airborne()) phase_ = Phase::kMission;
-  if (flight_.landed()) return aircraft_.actuators.disarm();
+  if (flight_.landed()) return aircraft_.disarm();
   FailsafeMeasures measures = measure(now);
   if (flight_.descending()) measures.tracking_error_m = 0.0;  // the ground stops it, and is meant to
   conditions_ = monitor_.step(now, measures);
@@ -128,7 +134,7 @@ void FlightProgram::begin(Action action, MonotonicTime now) noexcept {
   action_ = action;
   flight_.allow_take_off(action == Action::kGoOn);
   if (action == Action::kHold || action == Action::kLand) flight_.brake();
-  if (action == Action::kTerminate) aircraft_.actuators.terminate();
+  if (action == Action::kTerminate) aircraft_.terminate();
   action_since_ = now;
 }
 
@@ -207,9 +213,8 @@ void DecisionProgram::judge() noexcept {
 void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
   (void)mail_.report.take();
   const FlightReport& report = mail_.report.read();
-  stages::EstimatedState state;
-  if (given_up_.load(std::memory_order_acquire) || !report.airborne ||
-      report.estimator.state(state) != Status::kOk) {
+  const stages::EstimatedState& state = report.state;
+  if (given_up_.load(std::memory_order_acquire) || !report.airborne || !report.estimated) {
     // Nobody waits for it: decisions have not begun, or are over.
     last_usable_.fill(lane.release());
     publish(lane.release() + kIdlePeriod);
@@ -222,7 +227,7 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
     stages::PosedDepthFrame posed;
     Pose X_WB;
     if (cameras_[i]->read(posed.frame) == Status::kOk && is_usable(i, posed.frame) &&
-        report.estimator.pose_at(posed.frame.stamp, X_WB) == Status::kOk) {
+        report.past.pose_at(posed.frame.stamp, X_WB) == Status::kOk) {
       posed.X_WC = core::camera_pose(X_WB, cameras_[i]->mount());
       (void)frames_.push_back(posed);
       last_usable_[i] = posed.frame.stamp;
@@ -249,20 +254,41 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
 const Trajectory& DecisionProgram::flown(MonotonicTime now) const noexcept {
   const Trajectory& reported = mail_.report.read().committed;
   const bool newer = handed_over_.start_time > reported.start_time && handed_over_.start_time <= now &&
-                     now - handed_over_.start_time <= kReportDelay;
+                     now - handed_over_.start_time <= kReportDelay * config_.minor_frame;
   return newer ? handed_over_ : reported;
 }
 
 void DecisionProgram::hand_over(const core::LaneExecutive& lane) noexcept {
   if (out_.kind == DecisionKind::kKeep) return;
-  // Too late for its own start: the vehicle already flies its braking tail, and the result is of no use.
-  if (out_.kind == DecisionKind::kNew && out_.trajectory.start_time < lane.now()) {
+  // Too late for its own start: the vehicle already flies its braking tail, and the result is of no use. A
+  // stop is still better a little late; after a stall it would begin where the vehicle is no more.
+  const Nanos latest = out_.kind == DecisionKind::kNew ? Nanos{0} : kLatestStop;
+  if (out_.trajectory.start_time + latest < lane.now()) {
     ++too_late_;
     return;
   }
   handed_over_ = out_.trajectory;
   mail_.offer.draft() = {out_.trajectory, out_.kind == DecisionKind::kBrake};
   mail_.offer.publish();
+}
+
+void WatchdogProgram::run(SlotId, core::LaneExecutive& lane) noexcept {
+  const MonotonicTime now = lane.now();
+  const std::optional<SlotId> flight = flight_.overdue(now);
+  if (flight && flight_late_) lane.reactions().stop(*flight);
+  flight_late_ = flight.has_value();
+  const std::optional<SlotId> decision = decision_.overdue(now);
+  if (braking_ && !decision) {
+    lane.reactions().brake(*stalled_, false);
+    braking_ = false;
+  }
+  if (decision && decision_late_ && !braking_) {
+    lane.reactions().brake(*decision, true);
+    stalled_ = decision;
+    braking_ = true;
+    ++stalls_;
+  }
+  decision_late_ = decision.has_value();
 }
 
 void DecisionProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {

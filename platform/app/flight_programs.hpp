@@ -2,27 +2,34 @@
 /// knows whether time is real or virtual.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "core/exchange/mailbox.hpp"
+#include "core/executive/frame_table.hpp"
 #include "core/executive/lane_executive.hpp"
 #include "core/geometry/fence.hpp"
 #include "core/memory/static_vector.hpp"
 #include "firmware_if/depth_camera.hpp"
 #include "governor/failsafe/arbiter.hpp"
+#include "platform/app/aircraft.hpp"
 #include "platform/app/decision_pipeline.hpp"
 #include "platform/app/failsafe_monitor.hpp"
 #include "platform/app/flight_lane.hpp"
-#include "platform/app/simulated_aircraft.hpp"
 
 namespace roborun::app {
 
-/// Flight lane to decision lane, every minor frame.
+/// Flight lane to decision lane, every minor frame. What is large is written only where it has changed since
+/// this cell of the mailbox was written last.
 struct FlightReport {
-  stages::Estimator estimator{stages::Estimator::Config{}};  ///< State and recent poses.
+  stages::EstimatedState state{};
+  bool estimated{false};  ///< There is a state.
+  stages::PastStates past{Nanos{0}};
   Trajectory committed{};
+  std::uint64_t committed_number{0};
   bool airborne{false};
   governor::Action action{governor::Action::kGoOn};
   bool standing{false};
@@ -68,10 +75,8 @@ class FlightProgram final : public core::LaneProgram {
     core::Fence fence{};
     bool answers{true};  ///< False: conditions are seen and recorded, and nothing is done. For tests alone.
   };
-  FlightProgram(const Config& config, FlightLane& flight, SimulatedAircraft& aircraft, LaneMail& mail)
-      : config_(config), flight_(flight), aircraft_(aircraft), mail_(mail) {
-    if (!config.answers) aircraft_.actuators.ignore_kill_switch();
-  }
+  FlightProgram(const Config& config, FlightLane& flight, Aircraft& aircraft, LaneMail& mail)
+      : config_(config), flight_(flight), aircraft_(aircraft), mail_(mail) {}
   /// A frame belongs to the instant of its release, however late it begins.
   void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override;
   /// Offers refused because an overrun or the failsafe has the vehicle brake, or because they begin elsewhere
@@ -99,7 +104,7 @@ class FlightProgram final : public core::LaneProgram {
 
   Config config_;
   FlightLane& flight_;
-  SimulatedAircraft& aircraft_;
+  Aircraft& aircraft_;
   LaneMail& mail_;
   std::uint64_t offers_refused_{0};
   FailsafeMonitor monitor_;
@@ -118,6 +123,7 @@ class DecisionProgram final : public core::LaneProgram {
     Vector3 goal_W = Vector3::Zero();
     std::uint64_t seed{1};
     core::Fence fence{};
+    Nanos minor_frame{core::kMinorFrame};        ///< Of the flight lane.
     const std::uint64_t* map_refusals{nullptr};  ///< Grows when the map takes nothing more; may be null.
   };
   DecisionProgram(const Config& config, DecisionPipeline& pipeline,
@@ -161,6 +167,29 @@ class DecisionProgram final : public core::LaneProgram {
   std::array<MonotonicTime, 8> last_usable_{};  ///< By camera.
   std::array<std::uint64_t, 8> image_digest_{};
   std::uint64_t refusals_before_{0};
+};
+
+/// Twice in a row, so that a host which stops everything for a while does not count as a hang: a flight lane
+/// that is overdue ends the run; while the decision lane is, no new trajectory is taken and the committed one
+/// ends in its stop.
+class WatchdogProgram final : public core::LaneProgram {
+ public:
+  WatchdogProgram(const core::LaneExecutive& flight, const core::LaneExecutive& decision)
+      : flight_(flight), decision_(decision) {}
+  void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override;
+  /// Times that the decision lane hung; never decreases.
+  [[nodiscard]] std::uint64_t stalls() const noexcept { return stalls_; }
+  /// The slot in which it hung last.
+  [[nodiscard]] std::optional<core::SlotId> stalled() const noexcept { return stalled_; }
+
+ private:
+  const core::LaneExecutive& flight_;
+  const core::LaneExecutive& decision_;
+  bool flight_late_{false};
+  bool decision_late_{false};
+  bool braking_{false};
+  std::uint64_t stalls_{0};
+  std::optional<core::SlotId> stalled_;
 };
 
 }  // namespace roborun::app

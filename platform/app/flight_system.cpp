@@ -25,14 +25,12 @@ Trajectory take_off(const Vector3& ground_W, const Vector3& top_W, MonotonicTime
 /// Gives no answer while its fault lasts.
 class FaultyPlanner final : public stages::Planner {
  public:
-  FaultyPlanner(std::unique_ptr<stages::Planner> planner, const SimulatedAircraft& aircraft)
-      : planner_(std::move(planner)), aircraft_(aircraft) {}
+  FaultyPlanner(std::unique_ptr<stages::Planner> planner, const sitl::FaultKind& fault)
+      : planner_(std::move(planner)), fault_(fault) {}
   [[nodiscard]] Status plan(const stages::PlanRequest& request, const stages::MapView& view,
                             core::StageBudget& budget, stages::PlanResult& result) noexcept override {
-    const sitl::FaultKind kind = aircraft_.faults != nullptr ? aircraft_.faults->of(sitl::Component::kPlanner)
-                                                             : sitl::FaultKind::kNone;
-    const bool silent =
-        kind == sitl::FaultKind::kOff || (kind == sitl::FaultKind::kIntermittent && request.seed % 2 == 0);
+    const bool silent = fault_ == sitl::FaultKind::kOff ||
+                        (fault_ == sitl::FaultKind::kIntermittent && request.seed % 2 == 0);
     if (!silent) return planner_->plan(request, view, budget, result);
     result = {};
     return Status::kBudgetSpent;
@@ -40,21 +38,21 @@ class FaultyPlanner final : public stages::Planner {
 
  private:
   std::unique_ptr<stages::Planner> planner_;
-  const SimulatedAircraft& aircraft_;
+  const sitl::FaultKind& fault_;
 };
 
 }  // namespace
 
 FlightSystem::FlightSystem(const sitl::World& world, const MissionConfig& config, core::StageMeter& meter,
-                           SimulatedAircraft& aircraft,
-                           const std::array<firmware_if::DepthCamera*, kCameras>& cameras)
-    : cameras_(cameras), flight_({}, {}) {
+                           Aircraft& aircraft, const std::array<firmware_if::DepthCamera*, kCameras>& cameras)
+    : cameras_(cameras), flight_({}, {.period_s = seconds(config.minor_frame)}) {
   PipelineConfig pipeline;
   pipeline.flight_bounds_W = world.bounds_W();
   pipeline.map_bounds_W = {world.bounds_W().min_W - Vector3::Constant(kMapMargin_m),
                            world.bounds_W().max_W + Vector3::Constant(kMapMargin_m)};
   pipeline.horizon_m = config.camera.range_m - 1.0;
   pipeline.fence = config.fence;
+  pipeline.minor_frame = config.minor_frame;
 
   for (const auto& [name, p_W] : {std::pair{"start", world.start_W()}, std::pair{"goal", world.goal_W()}}) {
     const double room_m = pipeline.vehicle_radius_m + pipeline.inflation_m;
@@ -70,7 +68,7 @@ FlightSystem::FlightSystem(const sitl::World& world, const MissionConfig& config
   backends_ = make_backends(config.map_backend, config.planner_backend, pipeline.map_bounds_W, config.camera,
                             *arena_);
   if (!config.faults.empty())
-    backends_.planner = std::make_unique<FaultyPlanner>(std::move(backends_.planner), aircraft);
+    backends_.planner = std::make_unique<FaultyPlanner>(std::move(backends_.planner), planner_fault_);
   if (arena_->exhausted()) throw sitl::InputError("memory plan: the arena is too small for this world");
 
   const auto cost_of = [&config](core::StageId id) { return seconds(config.costs.cost(id, {})); };
@@ -85,7 +83,7 @@ FlightSystem::FlightSystem(const sitl::World& world, const MissionConfig& config
   g.sensor_volume_max_m3 =
       4.0 * config.camera.range_m * config.camera.range_m * std::min(height_m, 2.0 * config.camera.range_m);
   g.coarsest_level = coarsest_level_within(world.bounds_W().size().z() / 3.0);
-  g.minor_frame = core::kMinorFrame;
+  g.minor_frame = config.minor_frame;
   governor_.emplace(g);
   pipeline_.emplace(pipeline, meter, *governor_, *cloud_, *backends_.map, *backends_.planner, smoother_);
 
@@ -96,8 +94,9 @@ FlightSystem::FlightSystem(const sitl::World& world, const MissionConfig& config
   const std::uint64_t* refusals = nullptr;
   if (config.map_backend == "own")  // the stages have no type information to ask
     refusals = &static_cast<const stages::BrickMap&>(*backends_.map).counters().bricks_refused;
-  decision_program_.emplace(DecisionProgram::Config{world.goal_W(), config.seed, config.fence, refusals},
-                            *pipeline_, cameras_, mail_);
+  decision_program_.emplace(
+      DecisionProgram::Config{world.goal_W(), config.seed, config.fence, config.minor_frame, refusals},
+      *pipeline_, cameras_, mail_);
 }
 
 void FlightSystem::refuse_bricks(bool refuse) noexcept {

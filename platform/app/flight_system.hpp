@@ -24,7 +24,7 @@ class FlightSystem {
   /// Takes all memory. Throws sitl::InputError for an unknown backend, or a world too large for the map. All
   /// references must outlive it.
   FlightSystem(const sitl::World& world, const MissionConfig& config, core::StageMeter& meter,
-               SimulatedAircraft& aircraft, const std::array<firmware_if::DepthCamera*, kCameras>& cameras);
+               Aircraft& aircraft, const std::array<firmware_if::DepthCamera*, kCameras>& cameras);
   FlightSystem(const FlightSystem&) = delete;
   FlightSystem& operator=(const FlightSystem&) = delete;
 
@@ -37,12 +37,15 @@ class FlightSystem {
   [[nodiscard]] const stages::OccupancyMap& map() const noexcept { return *backends_.map; }
   /// A fault: the own map gets no memory for new bricks.
   void refuse_bricks(bool refuse) noexcept;
+  /// A fault: kOff, no answer; kIntermittent, often none; kNone. Without effect in a mission without faults.
+  void fail_planner(sitl::FaultKind fault) noexcept { planner_fault_ = fault; }
 
  private:
   std::array<firmware_if::DepthCamera*, kCameras> cameras_;
   std::vector<std::byte> block_;
   std::optional<core::Arena> arena_;
   std::optional<stages::PointCloud> cloud_;
+  sitl::FaultKind planner_fault_{sitl::FaultKind::kNone};
   MapAndPlanner backends_;
   stages::Smoother smoother_;
   std::optional<governor::Governor> governor_;

@@ -41,6 +41,7 @@ struct Options {
   std::string settings;
   std::string host_file;
   double host_factor{1.0};
+  std::string record;
   std::string trace;
   std::string plot;
   std::string colour{"speed"};
@@ -84,7 +85,9 @@ int fly(const Options& options) {
   if (options.colour != "speed" && options.colour != "precision") {
     throw InputError(fmt::format("--color: unknown colour '{}': must be speed or precision", options.colour));
   }
-  for (const std::string& path : {options.trace, options.plot}) {
+  if (!options.record.empty() && designs.size() != 1)
+    throw InputError("--record: one flight a file: must go with one --design");
+  for (const std::string& path : {options.trace, options.plot, options.record}) {
     const std::string error = report::cannot_write(path);
     if (!error.empty()) throw InputError(error);
   }
@@ -115,6 +118,7 @@ int fly(const Options& options) {
   config.costs = profile.costs;
   config.model = profile.model;
   config.seed = seed;
+  config.record = options.record;
   config.map_backend = options.map;
   config.planner_backend = options.planner;
   std::vector<report::MissionReport> reports;
@@ -153,6 +157,7 @@ int fly(const Options& options) {
   if (!error.empty()) throw InputError(error);
   if (!options.json && !options.plot.empty()) fmt::print("picture: {}\n", options.plot);
   if (!options.json && !options.trace.empty()) fmt::print("trace: {}\n", options.trace);
+  if (!options.json && !options.record.empty()) fmt::print("recording: {}\n", options.record);
   return all_reached ? 0 : 1;
 }
 
@@ -203,6 +208,8 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
   fly_app->add_option("--goal", options->goal, "With --world: X,Y,Z in metres");
   fly_app->add_option("--settings", options->settings,
                       "Cameras, wind, battery, speed from a TOML file (see platform/README.md)");
+  fly_app->add_option("--record", options->record,
+                      "Write all inputs of the flight to this file, for roborun replay (0.3 MB a decision)");
   fly_app->add_option("--trace", options->trace, "Write every decision to this CSV file");
   fly_app->add_option("--plot", options->plot, "Write a picture of the mission to this SVG file");
   fly_app->add_option("--color", options->colour, "Colour of the paths: speed or precision")

@@ -16,6 +16,7 @@
 #include "platform/app/gpio_command.hpp"
 #include "platform/app/map_command.hpp"
 #include "platform/app/memory_command.hpp"
+#include "platform/app/replay_command.hpp"
 #include "platform/app/scenario_command.hpp"
 #include "platform/app/solve_command.hpp"
 #include "platform/app/sweep_command.hpp"
@@ -49,6 +50,7 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   roborun::app::add_gpio_command(app, run);
   roborun::app::add_sweep_command(app, run);
   roborun::app::add_scenario_command(app, run);
+  roborun::app::add_replay_command(app, run);
   try {
     app.parse(argc, argv);
     return run ? run() : 2;

@@ -8,12 +8,12 @@
 #include <cstddef>
 #include <vector>
 
-#include "core/executive/lane_executive.hpp"
-#include "core/executive/lane_meter.hpp"
 #include "core/geometry/math.hpp"
 #include "core/record/state_hash.hpp"
 #include "platform/app/camera_rig.hpp"
-#include "platform/app/flight_system.hpp"
+#include "platform/app/lockstep_flight.hpp"
+#include "platform/app/recording.hpp"
+#include "platform/app/simulated_aircraft.hpp"
 #include "platform/sitl/fault/faulty_sensors.hpp"
 
 namespace roborun::app {
@@ -25,7 +25,6 @@ constexpr double kHover_mps = 0.3;
 constexpr double kHolding_s = 5.0;  // of hovering, until a hold counts as the end
 constexpr double kHardTouchdown_mps = 2.0;
 constexpr double kStorm_mps = 18.0;
-constexpr double kSlowCpu = 4.0;
 constexpr double kGiveUpAfter_s = 60.0;  // what cannot even stop
 
 double quantile(std::vector<double> values, double q) {
@@ -35,16 +34,15 @@ double quantile(std::vector<double> values, double q) {
   return values[static_cast<std::size_t>(std::ceil(at))];
 }
 
-/// One mission: the flight system under two virtual clocks, and the judge of what it does.
+/// One mission: a flight in lockstep, and the judge of what it does.
 class MissionRun {
  public:
   MissionRun(const sitl::World& world, const MissionConfig& config);
   report::MissionReport fly(const std::function<void(const Progress&)>& progress);
 
  private:
-  [[nodiscard]] std::array<firmware_if::DepthCamera*, kCameras> cameras();
+  [[nodiscard]] std::array<firmware_if::DepthCamera*, kCameras> connect_faults();
   void begin_faults();
-  void step_lanes();
   void watch();
   [[nodiscard]] const char* failsafe_reason();
   void record_decision(const DecisionOutput& out);
@@ -53,22 +51,16 @@ class MissionRun {
 
   const sitl::World& world_;
   const MissionConfig& config_;
-  core::CostProfile costs_;  ///< What computing costs now.
-  double slowed_by_{1.0};
-  MonotonicTime now_{};
   sitl::FaultLine faults_;
   std::vector<bool> begun_;  ///< By config_.faults.
   std::array<std::optional<MonotonicTime>, governor::kPhaseCount> phase_begin_{};
   CameraRig rig_;
   std::vector<sitl::FaultyDepthCamera> faulty_camera_;
   SimulatedAircraft aircraft_;
-  core::VirtualClock flight_clock_;
-  core::VirtualClock decision_clock_;
-  core::CostProfileMeter meter_;
-  FlightSystem system_;
-  core::Reactions reactions_;
-  core::LaneExecutive flight_lane_;
-  core::LaneExecutive decision_lane_;
+  std::array<firmware_if::DepthCamera*, kCameras> cameras_;
+  std::unique_ptr<FlightRecorder> recorder_;  ///< Null: nothing is recorded.
+  LockstepFlight flight_;
+  FlightSystem& system_;
 
   const char* give_up_{nullptr};  ///< Why the vehicle stops where it is.
   bool left_ground_{false};
@@ -83,23 +75,18 @@ class MissionRun {
 MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
     : world_(world),
       config_(config),
-      costs_(config.costs),
       begun_(config.faults.size(), false),
       rig_(world, config.camera, config.seed),
-      aircraft_{sitl::Vehicle(config.vehicle, config.wind,
-                              Vector3(world.start_W().x(), world.start_W().y(), 0.0), config.seed),
-                sitl::NavigationSensors(config.sensors, config.seed), rig_, ActuatorLink(config.seed)},
-      meter_(costs_, decision_clock_),
-      system_(world, config, meter_, aircraft_, cameras()),
-      flight_lane_(core::LaneId::kFlight, flight_clock_, system_.flight_program(), reactions_, nullptr),
-      decision_lane_(core::LaneId::kDecision, decision_clock_, system_.decision_program(), reactions_,
-                     nullptr) {
-  meter_.attach(decision_lane_);
-  flight_lane_.start(MonotonicTime{core::kMinorFrame});
-  decision_lane_.start(MonotonicTime{core::kMinorFrame});
-}
+      aircraft_(world, config, rig_),
+      cameras_(connect_faults()),
+      recorder_(config.record.empty()
+                    ? nullptr
+                    : std::make_unique<FlightRecorder>(config.record, world, config, aircraft_, cameras_)),
+      flight_(world, config, recorder_ ? recorder_->aircraft() : aircraft_,
+              recorder_ ? recorder_->cameras() : cameras_),
+      system_(flight_.system()) {}
 
-std::array<firmware_if::DepthCamera*, kCameras> MissionRun::cameras() {
+std::array<firmware_if::DepthCamera*, kCameras> MissionRun::connect_faults() {
   std::array<firmware_if::DepthCamera*, kCameras> all = rig_.cameras();
   if (config_.faults.empty()) return all;
   aircraft_.connect(faults_);
@@ -111,59 +98,34 @@ std::array<firmware_if::DepthCamera*, kCameras> MissionRun::cameras() {
   return all;
 }
 
+/// Those that begin with the next minor frame.
 void MissionRun::begin_faults() {
-  faults_.advance(now_);
+  const MonotonicTime now = flight_.now() + config_.minor_frame;
+  faults_.advance(now);
   const auto phase = static_cast<std::size_t>(system_.flight_program().phase());
-  if (!phase_begin_[phase]) phase_begin_[phase] = now_;
+  if (!phase_begin_[phase]) phase_begin_[phase] = now;
   for (std::size_t i = 0; i < begun_.size(); ++i) {
     const TimedFault& f = config_.faults[i];
     const auto from = f.phase ? phase_begin_[static_cast<std::size_t>(*f.phase)] : MonotonicTime{};
-    if (begun_[i] || !from || seconds(now_ - *from) < f.at_s) continue;
+    if (begun_[i] || !from || seconds(now - *from) < f.at_s) continue;
     begun_[i] = true;
     faults_.inject(f.fault, from_seconds(f.for_s));
-    if (report_.safety.first_fault_s < 0.0) report_.safety.first_fault_s = seconds(now_.time_since_epoch());
+    if (report_.safety.first_fault_s < 0.0) report_.safety.first_fault_s = seconds(now.time_since_epoch());
   }
   if (begun_.empty()) return;
   const bool storm = faults_.of(sitl::Component::kWind) == sitl::FaultKind::kOn;
-  aircraft_.vehicle.set_mean_wind(storm ? Vector3(0.0, kStorm_mps, 0.0) : config_.wind.mean_W_mps);
+  aircraft_.set_mean_wind(storm ? Vector3(0.0, kStorm_mps, 0.0) : config_.wind.mean_W_mps);
   system_.refuse_bricks(faults_.of(sitl::Component::kMap) == sitl::FaultKind::kOff);
-}
-
-/// One minor frame of all lanes. A decision is computed at once from the inputs of its start; its last slot,
-/// the hand-over, waits until the board would have been ready.
-void MissionRun::step_lanes() {
-  now_ += core::kMinorFrame;
-  begin_faults();
-  const sitl::FaultKind cpu = faults_.of(sitl::Component::kCpu);
-  flight_clock_.set(now_);
-  if (cpu == sitl::FaultKind::kOff)
-    aircraft_.fly_to(now_);  // the world does not wait
-  else
-    while (flight_lane_.release() <= now_) flight_lane_.run_frame();  // more than one after a stall
-  if (cpu == sitl::FaultKind::kOff || cpu == sitl::FaultKind::kStuck) return;
-  if (decision_lane_.in_frame() && decision_clock_.now() <= now_) decision_lane_.step();
-  if (decision_lane_.in_frame() || decision_lane_.release() > now_) return;
-  decision_clock_.set(now_);
-  const bool slow = seconds(now_.time_since_epoch()) >= config_.slow_down_at_s;
-  const double slow_by =
-      (slow ? config_.slow_down_factor : 1.0) * (cpu == sitl::FaultKind::kSlow ? kSlowCpu : 1.0);
-  if (slow_by != slowed_by_) {
-    costs_ = config_.costs;
-    for (core::StageCost& cost : costs_.stage) cost = core::slower(cost, slow_by);
-    slowed_by_ = slow_by;
-  }
-  const std::uint64_t before = system_.decision_program().decisions();
-  do decision_lane_.step();
-  while (decision_lane_.in_frame() && decision_lane_.next_slot() != core::SlotId::kHandOver);
-  if (system_.decision_program().decisions() > before) record_decision(system_.decision_program().output());
+  system_.fail_planner(faults_.of(sitl::Component::kPlanner));
 }
 
 void MissionRun::record_decision(const DecisionOutput& out) {
+  if (recorder_) recorder_->decided(out);
   const OperatingPoint& point = out.decision.point;
   report::DecisionRecord r;
-  r.time_s = seconds(now_.time_since_epoch());
-  r.p_WB = aircraft_.vehicle.state().p_WB;
-  r.speed_mps = aircraft_.vehicle.state().v_WB.norm();
+  r.time_s = seconds(flight_.now().time_since_epoch());
+  r.p_WB = aircraft_.vehicle().state().p_WB;
+  r.speed_mps = aircraft_.vehicle().state().v_WB.norm();
   r.p0_m = cell_size_m(point.p0_level);
   r.p1_m = cell_size_m(point.p1_level);
   r.v0_m3 = out.work[static_cast<std::size_t>(core::StageId::kMap)].volume_m3;
@@ -206,10 +168,10 @@ void MissionRun::record_decision(const DecisionOutput& out) {
 
 /// What the safety of the flight is judged by.
 void MissionRun::watch() {
-  const sitl::VehicleState& s = aircraft_.vehicle.state();
+  const sitl::VehicleState& s = aircraft_.vehicle().state();
   report::SafetyRecord& safety = report_.safety;
-  for (const double ratio : aircraft_.actuators.throttle()) {
-    if (ratio > 0.0) safety.last_thrust_s = seconds(now_.time_since_epoch());
+  for (const double ratio : aircraft_.actuators().throttle()) {
+    if (ratio > 0.0) safety.last_thrust_s = seconds(flight_.now().time_since_epoch());
   }
   if (!config_.fence.allows_over_ground({s.p_WB, s.p_WB})) safety.left_fence = true;
   left_ground_ = left_ground_ || (system_.flight().airborne() && s.p_WB.z() > 0.5);
@@ -219,14 +181,15 @@ void MissionRun::watch() {
 
 /// Null: the failsafe has not ended the mission.
 const char* MissionRun::failsafe_reason() {
-  const sitl::VehicleState& s = aircraft_.vehicle.state();
+  const sitl::VehicleState& s = aircraft_.vehicle().state();
   const FlightProgram& flight = system_.flight_program();
   const bool turning =
       std::any_of(s.thrust_ratio.begin(), s.thrust_ratio.end(), [](double ratio) { return ratio > 0.02; });
   switch (flight.action()) {
     case governor::Action::kHold:
-      return s.v_WB.norm() < kHover_mps && seconds(now_ - flight.action_since()) > kHolding_s ? "holding"
-                                                                                              : nullptr;
+      return s.v_WB.norm() < kHover_mps && seconds(flight_.now() - flight.action_since()) > kHolding_s
+                 ? "holding"
+                 : nullptr;
     case governor::Action::kLand:
       return system_.flight().landed() && !turning ? "landed" : nullptr;
     case governor::Action::kTerminate:
@@ -239,7 +202,7 @@ const char* MissionRun::failsafe_reason() {
 }
 
 const char* MissionRun::end_reason() {
-  const sitl::VehicleState& s = aircraft_.vehicle.state();
+  const sitl::VehicleState& s = aircraft_.vehicle().state();
   const double to_goal_m = (world_.goal_W() - s.p_WB).norm();
   const governor::Action action = system_.flight_program().action();
   watch();
@@ -255,7 +218,7 @@ const char* MissionRun::end_reason() {
   if (action != governor::Action::kGoOn) {
     if (const char* reason = failsafe_reason()) return reason;
     if (s.battery_ratio <= 0.0 && s.on_ground) return "battery_empty";
-    return seconds(now_.time_since_epoch()) > config_.time_limit_s ? "time_limit" : nullptr;
+    return seconds(flight_.now().time_since_epoch()) > config_.time_limit_s ? "time_limit" : nullptr;
   }
   if (to_goal_m < kReached_m && s.v_WB.norm() < kReachedSpeed_mps) {
     report_.result.reached_goal = true;
@@ -263,20 +226,22 @@ const char* MissionRun::end_reason() {
   }
   if (to_goal_m < best_distance_m_ - 0.5) {
     best_distance_m_ = to_goal_m;
-    best_at_ = now_;
+    best_at_ = flight_.now();
   }
   if (s.battery_ratio <= 0.0) return "battery_empty";
   if (give_up_ == nullptr) {
-    if (seconds(now_ - best_at_) > config_.no_progress_s) give_up_ = "no_path_to_goal";
-    if (seconds(now_.time_since_epoch()) > config_.time_limit_s) give_up_ = "time_limit";
-    if (give_up_ != nullptr) system_.decision_program().give_up();
+    if (seconds(flight_.now() - best_at_) > config_.no_progress_s) give_up_ = "no_path_to_goal";
+    if (seconds(flight_.now().time_since_epoch()) > config_.time_limit_s) give_up_ = "time_limit";
+    if (give_up_ == nullptr) return nullptr;
+    system_.decision_program().give_up();
+    if (recorder_) recorder_->gave_up();
     return nullptr;
   }
   // Given up: no more decisions; the committed trajectory ends in a stop, and the mission in a hover.
   const Trajectory& committed = system_.flight().committed();
-  const bool stopped =
-      now_ > committed.start_time + from_seconds(committed.duration_s()) && s.v_WB.norm() < kHover_mps;
-  const bool helpless = seconds(now_.time_since_epoch()) > config_.time_limit_s + kGiveUpAfter_s;
+  const bool stopped = flight_.now() > committed.start_time + from_seconds(committed.duration_s()) &&
+                       s.v_WB.norm() < kHover_mps;
+  const bool helpless = seconds(flight_.now().time_since_epoch()) > config_.time_limit_s + kGiveUpAfter_s;
   return stopped || helpless ? give_up_ : nullptr;
 }
 
@@ -287,9 +252,9 @@ void MissionRun::summarise(double wall_s) {
   r.seed = config_.seed;
   r.map = config_.map_backend;
   r.planner = config_.planner_backend;
-  r.mission_time_s = seconds(now_.time_since_epoch());
+  r.mission_time_s = seconds(flight_.now().time_since_epoch());
   r.mean_velocity_mps = r.mission_time_s > 0.0 ? r.distance_m / r.mission_time_s : 0.0;
-  r.energy_kJ = 1e-3 * aircraft_.vehicle.state().energy_J;
+  r.energy_kJ = 1e-3 * aircraft_.vehicle().state().energy_J;
   r.decisions = report_.decisions.size();
   std::vector<double> precision_m;
   for (const report::DecisionRecord& d : report_.decisions) {
@@ -312,25 +277,29 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
   const double whole_m = (world_.goal_W() - world_.start_W()).norm();
   const char* reason = nullptr;
   for (std::uint64_t frame = 0; reason == nullptr; ++frame) {
-    const Vector3 before_W = aircraft_.vehicle.state().p_WB;
-    step_lanes();
-    const sitl::VehicleState& s = aircraft_.vehicle.state();
+    const Vector3 before_W = aircraft_.vehicle().state().p_WB;
+    begin_faults();
+    if (const DecisionOutput* decision = flight_.step(faults_.of(sitl::Component::kCpu)))
+      record_decision(*decision);
+    const sitl::VehicleState& s = aircraft_.vehicle().state();
     report_.result.distance_m += (s.p_WB - before_W).norm();
     report_.result.max_velocity_mps = std::max(report_.result.max_velocity_mps, s.v_WB.norm());
     hash_.add(s.p_WB);
     hash_.add(s.v_WB);
-    if (frame % 40 == 0) report_.path.push_back({seconds(now_.time_since_epoch()), s.p_WB, s.v_WB.norm()});
+    if (frame % 40 == 0)
+      report_.path.push_back({seconds(flight_.now().time_since_epoch()), s.p_WB, s.v_WB.norm()});
     if (frame % 400 == 0 && progress) {
-      progress({seconds(now_.time_since_epoch()),
+      progress({seconds(flight_.now().time_since_epoch()),
                 std::clamp(1.0 - (world_.goal_W() - s.p_WB).norm() / whole_m, 0.0, 1.0), s.v_WB.norm()});
     }
     if (config_.each_frame)
-      config_.each_frame({now_, s, system_.flight().committed(), system_.flight().airborne()});
+      config_.each_frame({flight_.now(), s, system_.flight().committed(), system_.flight().airborne()});
     reason = end_reason();
   }
+  if (recorder_) recorder_->finish(system_.map());
   report_.result.reason = reason;
   report_.pools = system_.pools();
-  report_.safety.end_W = aircraft_.vehicle.state().p_WB;
+  report_.safety.end_W = aircraft_.vehicle().state().p_WB;
   report_.safety.landing_site_was_known = system_.flight_program().site_was_known();
   for (const FailsafeEvent& e : system_.flight_program().events()) {
     report::FailsafeRecord record{

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/executive/cost_profile.hpp"
+#include "core/executive/frame_table.hpp"
 #include "core/geometry/fence.hpp"
 #include "core/trajectory.hpp"
 #include "governor/failsafe/arbiter.hpp"
@@ -47,6 +48,7 @@ struct MissionConfig {
   std::string map_backend{"own"};      ///< "own" or "octomap".
   std::string planner_backend{"own"};  ///< "own" or "ompl:NAME".
   double v_max_mps{6.0};
+  Nanos minor_frame{core::kMinorFrame};  ///< core::minor_frame_of() a legal rate.
   sitl::DepthCameraConfig camera{};
   sitl::NavigationSensorsConfig sensors{};
   sitl::VehicleConfig vehicle{};
@@ -58,6 +60,7 @@ struct MissionConfig {
   core::Fence fence{};               ///< Start and goal must be inside.
   std::vector<TimedFault> faults{};  ///< At most sitl::FaultLine::kMost.
   bool answers{true};  ///< False: the failsafe and the kill switch do nothing. To show that a fault matters.
+  std::string record;  ///< File for the recording of the flight; empty: none.
   double no_progress_s{120.0};  ///< Not nearer to the goal for so long: the mission is given up, hovering.
   /// Called after every minor frame, may be empty: what a test measures.
   std::function<void(const FrameRecord&)> each_frame{};
@@ -73,7 +76,8 @@ struct Progress {
 /// give the same report, but for real_time_factor. `progress` (may be empty) is called about once a second of
 /// virtual time. A failsafe ends a mission as "landed", "holding" (hovers for 5 s), "terminated" or "killed"
 /// (motors off, on the ground); a touch-down of at most 2 m/s is no collision. result.env, mission and
-/// profile are left to the caller. Throws sitl::InputError for an unknown backend.
+/// profile are left to the caller. Throws sitl::InputError for an unknown backend, and for a recording that
+/// cannot be written, or whose flight has faults that no recording holds (FlightRecorder).
 [[nodiscard]] report::MissionReport fly_mission(const sitl::World& world, const MissionConfig& config,
                                                 const std::function<void(const Progress&)>& progress);
 

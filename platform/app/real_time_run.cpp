@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <memory>
@@ -15,6 +16,7 @@
 #include "core/executive/lane_meter.hpp"
 #include "platform/app/camera_rig.hpp"
 #include "platform/app/flight_system.hpp"
+#include "platform/app/simulated_aircraft.hpp"
 #include "platform/rt/host_identity.hpp"
 #include "platform/rt/lane_thread.hpp"
 #include "platform/rt/memory_lock.hpp"
@@ -42,26 +44,27 @@ const char* to_string(core::OverrunPolicy policy) {
 /// Runs the program, and in one of its slots the fault.
 class Injected final : public core::LaneProgram {
  public:
-  Injected(core::LaneProgram& program, const std::optional<Injection>& fault)
-      : program_(program), fault_(fault) {}
+  Injected(core::LaneProgram& program, const std::optional<Injection>& fault, const std::atomic<bool>& over)
+      : program_(program), fault_(fault), over_(over) {}
   void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override {
     program_.run(slot, lane);
-    if (!fault_ || fault_->slot != slot || lane.frame() < fault_->from_frame || done_ == fault_->frames)
+    if (!fault_ || fault_->slot != slot || ++run_ <= fault_->from_run ||
+        run_ - fault_->from_run > fault_->runs)
       return;
-    ++done_;
     const MonotonicTime until = lane.now() + fault_->spin;
     if (fault_->heap_call) {
       void* volatile block = std::malloc(32);
       std::free(block);
     }
-    while (lane.now() < until) {
+    while (lane.now() < until && !over_.load(std::memory_order_relaxed)) {
     }
   }
 
  private:
   core::LaneProgram& program_;
   const std::optional<Injection>& fault_;
-  std::uint64_t done_{0};
+  const std::atomic<bool>& over_;
+  std::uint64_t run_{0};
 };
 
 /// stress-ng on all CPUs for as long as it lives.
@@ -109,6 +112,8 @@ class RealTimeRun {
   FlightSystem system_;
   rt::MonotonicClock clock_;
   core::Reactions reactions_;
+  WatchdogProgram watchdog_;
+  std::atomic<bool> over_{false};  ///< Whatever was measured is measured.
   std::array<core::TraceRing, core::kLaneCount> ring_;
   std::array<Injected, core::kLaneCount> program_;
   std::array<core::LaneExecutive, core::kLaneCount> lane_;
@@ -120,21 +125,22 @@ class RealTimeRun {
 RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
     : config_(config),
       cameras_(world, config.mission.camera, config.mission.seed),
-      aircraft_{sitl::Vehicle(config.mission.vehicle, config.mission.wind,
-                              Vector3(world.start_W().x(), world.start_W().y(), 0.0), config.mission.seed),
-                sitl::NavigationSensors(config.mission.sensors, config.mission.seed), cameras_,
-                ActuatorLink(config.mission.seed)},
+      aircraft_(world, config.mission, cameras_),
       system_(world, config.mission, meter_, aircraft_, cameras_.cameras()),
-      program_{Injected{system_.flight_program(), config.inject},
-               Injected{system_.decision_program(), config.inject}, Injected{cameras_, config.inject}},
+      watchdog_(lane_[0], lane_[1]),
+      program_{Injected{system_.flight_program(), config.inject, over_},
+               Injected{system_.decision_program(), config.inject, over_},
+               Injected{cameras_, config.inject, over_}, Injected{watchdog_, config.inject, over_}},
       lane_{core::LaneExecutive(core::LaneId::kFlight, clock_, program_[0], reactions_,
                                 config.trace ? &ring_[0] : nullptr),
             core::LaneExecutive(core::LaneId::kDecision, clock_, program_[1], reactions_,
                                 config.trace ? &ring_[1] : nullptr),
             core::LaneExecutive(core::LaneId::kBackground, clock_, program_[2], reactions_,
-                                config.trace ? &ring_[2] : nullptr)},
+                                config.trace ? &ring_[2] : nullptr),
+            core::LaneExecutive(core::LaneId::kWatchdog, clock_, program_[3], reactions_,
+                                config.trace ? &ring_[3] : nullptr)},
       thread_{rt::LaneThread(lane_[0], clock_), rt::LaneThread(lane_[1], clock_),
-              rt::LaneThread(lane_[2], clock_)} {
+              rt::LaneThread(lane_[2], clock_), rt::LaneThread(lane_[3], clock_)} {
   meter_.attach(lane_[1]);
 }
 
@@ -149,15 +155,17 @@ void RealTimeRun::start_threads() {
     throw sitl::InputError(fmt::format("cannot run in real time: {} (--best-effort runs on without)",
                                        fmt::join(missing_, "; ")));
   // Whole frames of simulated time from its own start, so that both clocks show the same.
-  const std::int64_t frames = (clock_.now().time_since_epoch() + kLeadTime) / core::kMinorFrame + 1;
-  const MonotonicTime first{frames * core::kMinorFrame};
-  aircraft_.now = first - core::kMinorFrame;
+  const Nanos minor_frame = config_.mission.minor_frame;
+  const std::int64_t frames = (clock_.now().time_since_epoch() + kLeadTime) / minor_frame + 1;
+  const MonotonicTime first{frames * minor_frame};
+  aircraft_.start(first - minor_frame);
   rt::seal_heap(config_.seal);
   for (std::size_t i = 0; i < core::kLaneCount; ++i) {
     placement_[i] = rt::placement_of(core::kLanes[i]);
     if (!fifo) placement_[i].priority = 0;
-    lane_[i].start(first);
+    lane_[i].start(first, minor_frame);
     const std::string error = thread_[i].start(placement_[i], true);
+    over_.store(!error.empty(), std::memory_order_relaxed);  // the lanes that run must end
     if (!error.empty()) throw sitl::InputError(error);
   }
 }
@@ -223,7 +231,7 @@ void RealTimeRun::fill_slots(report::AuditReport& report) const {
 
 report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress) {
   report::AuditReport report;
-  const Vector3 start_W = aircraft_.vehicle.state().p_WB;
+  const Vector3 start_W = aircraft_.vehicle().state().p_WB;
   {
     const Load load(config_.load);
     const std::uint64_t heap_before = rt::sealed_heap_calls();
@@ -238,6 +246,7 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
       if (progress && report.seconds >= told_s + 1.0) progress(told_s = report.seconds);
     }
     for (rt::LaneThread& thread : thread_) thread.request_stop();
+    over_.store(true, std::memory_order_relaxed);
     for (rt::LaneThread& thread : thread_) thread.join();
     rt::seal_heap(rt::HeapSeal::kOpen);
     report.heap_calls_after_start = rt::sealed_heap_calls() - heap_before;
@@ -247,6 +256,7 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
   report.best_effort = !missing_.empty();
   report.missing = missing_;
   report.load = config_.load;
+  report.rate_Hz = 1.0 / seconds(config_.mission.minor_frame);
   report.heap_sealed = rt::heap_seal_works();
   if (report.heap_calls_after_start > 0) {
     for (const rt::HeapCallSite& site : rt::heap_call_sites())
@@ -255,9 +265,12 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
   report.decisions = system_.decision_program().decisions();
   report.decisions_too_late = system_.decision_program().too_late();
   report.offers_refused = system_.flight_program().offers_refused();
+  report.decision_stalls = watchdog_.stalls();
+  if (watchdog_.stalled()) report.stalled_in = core::slot(*watchdog_.stalled()).name;
   report.exposures_dropped = cameras_.exposures_dropped();
   report.least_clearance_m = cameras_.least_clearance_m();
-  report.flown_m = (aircraft_.vehicle.state().p_WB - start_W).norm();
+  report.speed_mps = aircraft_.vehicle().state().v_WB.norm();
+  report.flown_m = (aircraft_.vehicle().state().p_WB - start_W).norm();
   if (reactions_.stopping()) report.stopped_by = core::slot(reactions_.stopped_by()).name;
   fill_lanes(report);
   fill_slots(report);
@@ -287,9 +300,7 @@ report::AuditReport run_real_time(const sitl::World& world, const RealTimeConfig
 
 std::vector<report::PoolUse> memory_plan_of(const sitl::World& world, const MissionConfig& config) {
   CameraRig rig(world, config.camera, config.seed);
-  SimulatedAircraft aircraft{sitl::Vehicle(config.vehicle, config.wind, world.start_W(), config.seed),
-                             sitl::NavigationSensors(config.sensors, config.seed), rig,
-                             ActuatorLink(config.seed)};
+  SimulatedAircraft aircraft(world, config, rig);
   core::ClockMeter meter;
   const auto system = std::make_unique<FlightSystem>(world, config, meter, aircraft, rig.cameras());
   return system->pools();

@@ -1,4 +1,4 @@
-/// The flight system under the real clock: three pinned threads, locked memory, a sealed heap, simulated
+/// The flight system under the real clock: pinned threads, locked memory, a sealed heap, simulated
 /// sensors.
 #pragma once
 
@@ -15,10 +15,10 @@ namespace roborun::app {
 /// A fault put in on purpose, for tests and demonstrations.
 struct Injection {
   core::SlotId slot{};
-  Nanos spin{};                ///< Busy for so long each time.
-  std::uint64_t from_frame{};  ///< Of its lane, counted from the first.
-  std::uint64_t frames{};      ///< So many frames.
-  bool heap_call{false};       ///< And one malloc and free.
+  Nanos spin{};              ///< Busy for so long each time, or until the run is over.
+  std::uint64_t from_run{};  ///< Of the slot, counted from the first.
+  std::uint64_t runs{};      ///< So many of them.
+  bool heap_call{false};     ///< And one malloc and free.
 };
 
 struct RealTimeConfig {

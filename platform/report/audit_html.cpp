@@ -70,10 +70,13 @@ std::string audit_html(const AuditReport& r) {
       "12px}.g{stroke:#ddd}.b{stroke:#c33;stroke-dasharray:4 "
       "3}.p{fill:none;stroke:#26c;stroke-width:1.5}.bad{color:"
       "#c33;font-weight:bold}</style></head><body><h1>roborun timing audit</h1>\n";
-  h += fmt::format("<p>{:.0f} s{}, {} decisions ({} too late), {:.0f} m flown.</p>", r.seconds,
-                   r.load ? " under load" : "", r.decisions, r.decisions_too_late, r.flown_m);
+  h += fmt::format("<p>{:.0f} s at {:g} Hz{}, {} decisions ({} too late), {:.0f} m flown.</p>", r.seconds,
+                   r.rate_Hz, r.load ? " under load" : "", r.decisions, r.decisions_too_late, r.flown_m);
   for (const std::string& why : r.missing)
     h += fmt::format("<p class=\"bad\">Not real time (best effort): {}</p>", xml_escape(why));
+  if (r.decision_stalls > 0)
+    h += fmt::format("<p class=\"bad\">The decision lane hung {} times, the last time in {}</p>",
+                     r.decision_stalls, xml_escape(r.stalled_in));
   if (!r.stopped_by.empty())
     h += fmt::format("<p class=\"bad\">Stopped by the overruns of {}</p>", xml_escape(r.stopped_by));
   h += "<table>" + row({"memory", ""}, "th");

@@ -99,6 +99,7 @@ std::uint64_t major_faults(const AuditReport& r) {
 std::string to_json(const AuditReport& r) {
   Json j;
   j["seconds"] = r.seconds;
+  j["rate_Hz"] = r.rate_Hz;
   j["best_effort"] = r.best_effort;
   j["missing"] = r.missing;
   j["load"] = r.load;
@@ -112,6 +113,8 @@ std::string to_json(const AuditReport& r) {
   j["decisions_too_late"] = r.decisions_too_late;
   j["exposures_dropped"] = r.exposures_dropped;
   j["offers_refused"] = r.offers_refused;
+  j["decision_stalls"] = r.decision_stalls;
+  j["stalled_in"] = r.stalled_in;
   j["flown_m"] = r.flown_m;
   j["least_clearance_m"] = r.least_clearance_m;
   j["stopped_by"] = r.stopped_by;
@@ -156,13 +159,17 @@ std::string audit_table(const AuditReport& r) {
         s.time.max_us, s.budget_us, 100.0 * s.margin_ratio, s.overruns);
   }
   text += fmt::format(
-      "\n{:.0f} s{}, {} decisions ({} too late), {:.0f} m flown; heap calls after start: {}; page faults: {} "
+      "\n{:.0f} s at {:g} Hz{}, {} decisions ({} too late), {:.0f} m flown; heap calls after start: {}; page "
+      "faults: {} "
       "minor, {} "
       "major; locked: {:.1f} MiB\n",
-      r.seconds, r.load ? " under load" : "", r.decisions, r.decisions_too_late, r.flown_m,
+      r.seconds, r.rate_Hz, r.load ? " under load" : "", r.decisions, r.decisions_too_late, r.flown_m,
       r.heap_sealed ? fmt::format("{}", r.heap_calls_after_start) : "not counted in this build",
       minor_faults(r), major_faults(r), static_cast<double>(r.locked_bytes) / 1048576.0);
   for (const auto& [name, count] : r.heap_sites) text += fmt::format("  heap: {} x {}\n", count, name);
+  if (r.decision_stalls > 0)
+    text += fmt::format("the decision lane hung {} times, the last time in {}\n", r.decision_stalls,
+                        r.stalled_in);
   if (!r.stopped_by.empty()) text += fmt::format("stopped by the overruns of {}\n", r.stopped_by);
   return text;
 }

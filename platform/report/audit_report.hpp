@@ -52,6 +52,7 @@ struct AuditTraceEvent {
 
 struct AuditReport {
   double seconds{};
+  double rate_Hz{};    ///< Of the flight lane.
   bool best_effort{};  ///< Asked for, and needed: `missing` says why.
   std::vector<std::string> missing;
   bool load{};
@@ -60,7 +61,9 @@ struct AuditReport {
   std::vector<std::pair<std::string, std::uint64_t>> heap_sites;
   std::uint64_t locked_bytes{};
   std::uint64_t decisions{}, decisions_too_late{}, exposures_dropped{}, offers_refused{};
-  double flown_m{}, least_clearance_m{};
+  std::uint64_t decision_stalls{};  ///< Times that the watchdog found the decision lane hanging.
+  std::string stalled_in;           ///< The slot of the last one.
+  double flown_m{}, least_clearance_m{}, speed_mps{};  ///< The speed is that of the end.
   std::string stopped_by;  ///< The slot whose overruns ended the run; empty if none did.
   std::vector<AuditLane> lanes;
   std::vector<AuditSlot> slots;

@@ -18,9 +18,9 @@ constexpr std::byte kPaint{0xA5};
 constexpr std::size_t kProbeStack_bytes =
     64 * std::size_t{1024};  // the C library keeps it for the next thread
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr std::size_t kStackFactor = 4;  // their frames are larger
+constexpr std::size_t kMoreStack_bytes = std::size_t{4} << 20U;  // larger frames, and their own thread data
 #else
-constexpr std::size_t kStackFactor = 1;
+constexpr std::size_t kMoreStack_bytes = 0;
 #endif
 
 std::vector<int> allowed_cpus() {
@@ -57,7 +57,8 @@ std::vector<std::string> why_not_real_time() {
   pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
   pthread_attr_setschedpolicy(&attributes, SCHED_FIFO);
   sched_param param{};
-  param.sched_priority = core::lane(core::LaneId::kFlight).priority;
+  for (const core::LaneSpec& spec : core::kLanes)
+    param.sched_priority = std::max(param.sched_priority, spec.priority);
   pthread_attr_setschedparam(&attributes, &param);
   pthread_attr_setstacksize(&attributes, kProbeStack_bytes);
   pthread_t probe{};
@@ -81,7 +82,7 @@ LaneThread::~LaneThread() {
 std::string LaneThread::start(const Placement& placement, bool watch_heap) {
   watch_heap_ = watch_heap;
   const std::string name = core::lane(lane_.id()).name;
-  stack_bytes_ = kStackFactor * core::lane(lane_.id()).stack_bytes;
+  stack_bytes_ = core::lane(lane_.id()).stack_bytes + kMoreStack_bytes;
   void* block =
       mmap(nullptr, stack_bytes_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_STACK, -1, 0);
   if (block == MAP_FAILED) return "lane " + name + ": no memory for its stack";

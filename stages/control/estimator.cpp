@@ -67,8 +67,7 @@ Status Estimator::predict(const firmware_if::ImuSample& sample) noexcept {
     since_covariance_ = 0;
     covariance_dt_s_ = 0.0;
   }
-  ring_[ring_count_ % kRing] = {state_.stamp, state_.p_WB, state_.v_WB, state_.q_WB};
-  ++ring_count_;
+  past_.add({state_.stamp, state_.p_WB, state_.v_WB, state_.q_WB});
   reset_if_broken();
   return Status::kOk;
 }
@@ -137,7 +136,7 @@ void Estimator::start(const firmware_if::GnssFix& fix) noexcept {
     P_(kGyroBias + i, kGyroBias + i) = 0.005 * 0.005;
     P_(kAccelBias + i, kAccelBias + i) = 0.1 * 0.1;
   }
-  ring_count_ = 0;
+  past_.clear();
   since_covariance_ = 0;
   covariance_dt_s_ = 0.0;
   started_ = true;
@@ -161,7 +160,7 @@ Status Estimator::update(const firmware_if::GnssFix& fix) noexcept {
     ++counters_.gnss;
     return Status::kOk;
   }
-  const Past* then = past(fix.stamp);
+  const PastStates::Past* then = past_.at(fix.stamp);
   if (fix.stamp <= last_gnss_ || then == nullptr) {
     ++counters_.refused_stamp;
     return Status::kStale;
@@ -191,7 +190,7 @@ Status Estimator::update(const firmware_if::BarometerSample& sample) noexcept {
     return Status::kInvalidArgument;
   }
   if (!started_) return Status::kNotReady;
-  const Past* then = past(sample.stamp);
+  const PastStates::Past* then = past_.at(sample.stamp);
   if (sample.stamp <= last_barometer_ || then == nullptr) {
     ++counters_.refused_stamp;
     return Status::kStale;
@@ -211,30 +210,13 @@ Status Estimator::state(EstimatedState& out) const noexcept {
   return Status::kOk;
 }
 
-const Estimator::Past* Estimator::past(MonotonicTime stamp) const noexcept {
-  const std::size_t available = ring_count_ < kRing ? ring_count_ : kRing;
-  if (available == 0 || state_.stamp - stamp > config_.oldest_fix || stamp > state_.stamp) return nullptr;
-  for (std::size_t back = 1; back <= available; ++back) {
-    const Past& p = ring_[(ring_count_ - back) % kRing];
-    if (p.stamp <= stamp + Nanos{1'250'000}) return &p;
-  }
-  return nullptr;
-}
-
-Status Estimator::pose_at(MonotonicTime stamp, Pose& X_WB) const noexcept {
-  const Past* then = past(stamp);
-  if (then == nullptr || stamp - then->stamp > Nanos{20'000'000}) return Status::kStale;
-  X_WB = {then->q_WB.toRotationMatrix(), then->p_WB};
-  return Status::kOk;
-}
-
 void Estimator::reset_if_broken() noexcept {
   const bool fine = is_finite(state_.p_WB) && is_finite(state_.v_WB) && state_.q_WB.coeffs().allFinite() &&
                     is_finite(gyro_bias_B_) && is_finite(accel_bias_B_) && P_.diagonal().allFinite();
   if (fine) return;
   ++counters_.resets;
   started_ = false;
-  ring_count_ = 0;
+  past_.clear();
 }
 
 }  // namespace roborun::stages

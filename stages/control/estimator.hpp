@@ -3,7 +3,6 @@
 /// world frame.
 #pragma once
 
-#include <array>
 #include <cstdint>
 
 #include "core/geometry/vector.hpp"
@@ -11,6 +10,7 @@
 #include "firmware_if/gnss.hpp"
 #include "firmware_if/imu.hpp"
 #include "firmware_if/status.hpp"
+#include "stages/control/past_states.hpp"
 
 namespace roborun::stages {
 
@@ -53,7 +53,7 @@ class Estimator {
     std::uint64_t resets{};  ///< A NaN got inside: started again from the next fix.
   };
 
-  explicit Estimator(const Config& config) noexcept : config_(config) {}
+  explicit Estimator(const Config& config) noexcept : config_(config), past_(config.oldest_fix) {}
 
   /// One IMU sample, in order. Refused (kInvalidArgument, kStale) if not finite or not newer than the one
   /// before. RT-safe: O(1), about 2 us, every fourth call 5 us more for the covariance.
@@ -65,8 +65,8 @@ class Estimator {
 
   /// kNotReady before the first fix.
   [[nodiscard]] Status state(EstimatedState& out) const noexcept;
-  /// The pose at a past instant within the last 0.5 s, nearest sample (1.25 ms). kStale outside.
-  [[nodiscard]] Status pose_at(MonotonicTime stamp, Pose& X_WB) const noexcept;
+  /// As estimated then: a late fix corrects the present only.
+  [[nodiscard]] const PastStates& past() const noexcept { return past_; }
   /// True if no IMU sample came for config.imu_lost_after.
   [[nodiscard]] bool imu_lost(MonotonicTime now) const noexcept {
     return now - state_.stamp > config_.imu_lost_after;
@@ -75,21 +75,13 @@ class Estimator {
 
  private:
   static constexpr int kStates = 15;
-  static constexpr std::size_t kRing = 200;
   using Covariance = Eigen::Matrix<double, kStates, kStates>;
-  struct Past {
-    MonotonicTime stamp{};
-    Vector3 p_WB = Vector3::Zero();
-    Vector3 v_WB = Vector3::Zero();
-    Quaternion q_WB = Quaternion::Identity();
-  };
 
   void start(const firmware_if::GnssFix& fix) noexcept;
   void propagate_covariance(double dt_s) noexcept;
   /// One scalar measurement of error state `index`; false if gated out.
   bool correct(int index, double innovation, double sigma) noexcept;
   void reset_if_broken() noexcept;
-  [[nodiscard]] const Past* past(MonotonicTime stamp) const noexcept;
 
   Config config_;
   Counters counters_{};
@@ -104,8 +96,7 @@ class Estimator {
   double covariance_dt_s_{0.0};
   MonotonicTime last_gnss_{};
   MonotonicTime last_barometer_{};
-  std::array<Past, kRing> ring_{};
-  std::size_t ring_count_{0};
+  PastStates past_;
 };
 
 }  // namespace roborun::stages

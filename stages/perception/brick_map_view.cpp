@@ -22,15 +22,14 @@ Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& bu
   for (std::int32_t bz = 0; bz < nz_; ++bz) {
     for (std::int32_t by = 0; by < ny_; ++by) {
       for (std::int32_t bx = 0; bx < nx_; ++bx, ++position) {
+        // Too late to know what fits: the radius of the view before stays, around the new centre. What is
+        // known is as true as ever, v1 only saves the planner work.
+        if (position % 1024 == 1023 && budget.spent(work)) return Status::kBudgetSpent;
         const Brick* brick = brick_at(position);
         if (brick == nullptr || brick->known_count == 0) continue;
+        ++work.units;
         const double distance_m = (brick_center_W(bx, by, bz) - view_center_W_).norm();
         known[std::min(static_cast<std::size_t>(distance_m / kBucket_m), kBuckets - 1)] += brick->known_count;
-        if (++work.units % 1024 == 0 && budget.spent(work)) {
-          // Too late to know what fits: only the nearest space is safe to promise.
-          view_radius_m_ = kBrick_m;
-          return Status::kBudgetSpent;
-        }
       }
     }
   }

@@ -59,6 +59,7 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core
   bool full = false;
   bool spent = false;
   for (const PosedDepthFrame& posed : frames) {
+    if (spent) break;
     if (guard_.check(posed) != Status::kOk) {
       ++counters_.frames_refused;
       continue;

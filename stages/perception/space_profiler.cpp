@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/geometry/math.hpp"
+#include "stages/perception/polled_view.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -24,10 +25,17 @@ double distance_m(const Sector& a, const Sector& b) noexcept {
   return core::hypot2(a.x_m - b.x_m, a.y_m - b.y_m);
 }
 
-void profile_gaps(const SpaceProfilerConfig& config, std::span<const CloudPoint> points, const Vector3& p_WB,
-                  SpaceProfile& profile) noexcept {
+/// False if the budget was spent before the last point.
+bool profile_points(const SpaceProfilerConfig& config, std::span<const CloudPoint> points,
+                    const Vector3& p_WB, const Aabb& relevant_W, core::StageBudget& budget,
+                    const core::Work& work, SpaceProfile& profile) noexcept {
   std::array<Sector, kSectors> sector{};
-  for (const CloudPoint& point : points) {
+  profile.closest_obstacle_m = kInfinity;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i % 1024 == 0 && budget.spent(work)) return false;
+    const CloudPoint& point = points[i];
+    if (relevant_W.contains(point.p_W))
+      profile.closest_obstacle_m = std::fmin(profile.closest_obstacle_m, (point.p_W - p_WB).norm());
     const Vector3 offset = point.p_W - p_WB;
     const double range_m = core::hypot2(offset.x(), offset.y());
     if (std::fabs(offset.z()) > config.height_band_m || range_m > config.gap_reach_m || !(range_m > 0.0))
@@ -61,6 +69,7 @@ void profile_gaps(const SpaceProfilerConfig& config, std::span<const CloudPoint>
     }
   }
   profile.gap_average_m = count > 0 ? sum_m / count : kInfinity;
+  return true;
 }
 
 void profile_outlook(const SpaceProfilerConfig& config, const MapView& view, const Trajectory& committed,
@@ -86,20 +95,22 @@ void profile_outlook(const SpaceProfilerConfig& config, const MapView& view, con
 
 }  // namespace
 
-void profile_space(const SpaceProfilerConfig& config, std::span<const CloudPoint> points, const MapView& view,
-                   const Trajectory& committed, MonotonicTime now, const Vector3& p_WB, const Vector3& v_WB,
-                   const Vector3& goal_W, const Aabb& relevant_W, double radius_m, SpaceProfile& profile,
-                   std::uint64_t& lookups) noexcept {
-  profile_gaps(config, points, p_WB, profile);
-  profile.closest_obstacle_m = kInfinity;
-  for (const CloudPoint& point : points) {
-    if (!relevant_W.contains(point.p_W)) continue;
-    profile.closest_obstacle_m = std::fmin(profile.closest_obstacle_m, (point.p_W - p_WB).norm());
+Status profile_space(const SpaceProfilerConfig& config, std::span<const CloudPoint> points,
+                     const MapView& map, const Trajectory& committed, MonotonicTime now, const Vector3& p_WB,
+                     const Vector3& v_WB, const Vector3& goal_W, const Aabb& relevant_W, double radius_m,
+                     SpaceProfile& profile, core::StageBudget& budget, core::Work& work) noexcept {
+  const PolledView view(map, budget, work);
+  const bool all = profile_points(config, points, p_WB, relevant_W, budget, work, profile);
+  if (!all) {
+    profile.closest_obstacle_m = 0.0;
+    profile.gap_min_m = profile.gap_average_m = config.vehicle_width_m;
   }
   profile.speed_mps = v_WB.norm();
   const Vector3 ahead_W = profile.speed_mps > 0.2 ? v_WB : Vector3(goal_W - p_WB);
-  profile.closest_unknown_m = free_distance_m(view, p_WB, ahead_W, radius_m, config.max_visible_m, lookups);
-  profile_outlook(config, view, committed, now, radius_m, profile, lookups);
+  profile.closest_unknown_m =
+      free_distance_m(view, p_WB, ahead_W, radius_m, config.max_visible_m, work.units);
+  profile_outlook(config, view, committed, now, radius_m, profile, work.units);
+  return all && !view.spent() ? Status::kOk : Status::kBudgetSpent;
 }
 
 }  // namespace roborun::stages

@@ -3,6 +3,7 @@
 
 #include <span>
 
+#include "core/executive/stage_budget.hpp"
 #include "core/geometry/vector.hpp"
 #include "core/space_profile.hpp"
 #include "core/trajectory.hpp"
@@ -26,11 +27,14 @@ struct SpaceProfilerConfig {
 /// widest_gap_m. None: +infinity. Closest obstacle: nearest point within `relevant_W` (where the vehicle may
 /// be, grown by its radius), +infinity if none. Closest unknown: free distance in `view` ahead along v_WB, at
 /// rest towards goal_W; at most max_visible_m. Outlook: up to 32 samples of the trajectory from `now` to its
-/// end, each with the free distance along its motion there. `lookups` counts map cells visited. RT-safe:
-/// O(points + samples * range / cell).
-void profile_space(const SpaceProfilerConfig& config, std::span<const CloudPoint> points, const MapView& view,
-                   const Trajectory& committed, MonotonicTime now, const Vector3& p_WB, const Vector3& v_WB,
-                   const Vector3& goal_W, const Aabb& relevant_W, double radius_m, SpaceProfile& profile,
-                   std::uint64_t& lookups) noexcept;
+/// end, each with the free distance along its motion there. `work.units` grows by the map cells visited. The
+/// budget is polled every 1,024 points and lookups; once it is spent (kBudgetSpent, otherwise kOk) what has
+/// not been looked at counts as near: distances 0, a gap as narrow as the vehicle. RT-safe: O(points +
+/// samples * range / cell).
+[[nodiscard]] Status profile_space(const SpaceProfilerConfig& config, std::span<const CloudPoint> points,
+                                   const MapView& view, const Trajectory& committed, MonotonicTime now,
+                                   const Vector3& p_WB, const Vector3& v_WB, const Vector3& goal_W,
+                                   const Aabb& relevant_W, double radius_m, SpaceProfile& profile,
+                                   core::StageBudget& budget, core::Work& work) noexcept;
 
 }  // namespace roborun::stages

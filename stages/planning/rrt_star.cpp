@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
+#include "stages/perception/polled_view.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -13,7 +14,8 @@ constexpr double kVisitedCell_m3 = kVisitedCell_m * kVisitedCell_m * kVisitedCel
 constexpr double kGoalBias = 0.15;
 constexpr double kShortEdge_m = 0.3;  // a node nearer than this to another adds nothing
 constexpr double kEscape_m = 2.0;
-constexpr double kLookAhead_m = 12.0;  // beyond a path's end
+constexpr std::uint64_t kSpare = 4096;  // lookups that are granted whatever the budget says
+constexpr double kLookAhead_m = 12.0;   // beyond a path's end
 constexpr double kDetour_m =
     10.0;  // what a surface right ahead of a path's end costs: the way around a pillar
 
@@ -23,6 +25,16 @@ Vector3 towards_goal(const PlanRequest& request) noexcept {
   return distance_m <= request.horizon_m ? request.goal_W
                                          : Vector3(request.start_W + way * (request.horizon_m / distance_m));
 }
+
+/// A fixed number of lookups.
+class Spare final : public core::StageBudget {
+ public:
+  explicit Spare(const core::Work& work) noexcept : until_(work.units + kSpare) {}
+  [[nodiscard]] bool spent(const core::Work& done) noexcept override { return done.units >= until_; }
+
+ private:
+  std::uint64_t until_;
+};
 
 }  // namespace
 
@@ -240,7 +252,7 @@ void RrtStar::clear(Search& s) noexcept {
   add_node(request.start_W, -1, s.work);
 }
 
-Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::StageBudget& budget,
+Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::StageBudget& budget,
                      PlanResult& result) noexcept {
   result = {};
   const Vector3 size = request.bounds_W.size();
@@ -249,8 +261,11 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::Stag
     return Status::kInvalidArgument;
   }
   core::Work& work = result.work;
-  if (!view.is_free(Aabb::around(request.start_W, request.radius_m), work.units))
-    return escape(request, view, result);
+  const PolledView view(map, budget, work);
+  Spare spare(work);
+  const PolledView spare_view(map, spare, work);
+  if (!map.is_free(Aabb::around(request.start_W, request.radius_m), work.units))
+    return escape(request, spare_view, result);
   const bool goal_bad = !request.bounds_W.contains(request.goal_W) ||
                         view.at(request.goal_W, work.units) == CellState::kOccupied;
 
@@ -265,24 +280,25 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& view, core::Stag
   }
   std::int32_t best = 0;
   if (to_target_m > kShortEdge_m) {
-    const double free_m = free_distance_m(view, request.start_W, target_W - request.start_W, request.radius_m,
-                                          to_target_m, work.units);
+    const double free_m = free_distance_m(spare_view, request.start_W, target_W - request.start_W,
+                                          request.radius_m, to_target_m, work.units);
     if (free_m > 1.0) {
       const Vector3 end_W = request.start_W + (target_W - request.start_W) * (free_m / to_target_m);
       // Checked once more: this is an edge, and its samples lie elsewhere.
-      if (is_segment_free(view, request.start_W, end_W, request.radius_m, work.units) && may_add())
+      if (is_segment_free(spare_view, request.start_W, end_W, request.radius_m, work.units) && may_add())
         best = add_node(end_W, 0, work);
     }
     if (best > 0 && free_m >= to_target_m && request.bounds_W.contains(target_W)) {
-      extract(request, view, best, result);
+      extract(request, spare_view, best, result);
       result.reaches_goal = target_W == request.goal_W;
       return goal_bad ? Status::kGoalBlocked : Status::kOk;
     }
   }
-  return explore(s, goal_bad, best, result);
+  return explore(s, map, goal_bad, best, result);
 }
 
-Status RrtStar::explore(Search& s, bool goal_bad, std::int32_t best, PlanResult& result) noexcept {
+Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32_t best,
+                        PlanResult& result) noexcept {
   const PlanRequest& request = s.request;
   const MapView& view = s.view;
   core::Work& work = s.work;
@@ -318,7 +334,8 @@ Status RrtStar::explore(Search& s, bool goal_bad, std::int32_t best, PlanResult&
   const double stay_m =
       promise_m(node(0), request.goal_W) + detour_m(request, view, request.start_W, work.units);
   if (best == 0 || best_m > stay_m - view.cell_m()) return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
-  extract(request, view, best, result);
+  Spare spare(work);
+  extract(request, PolledView(map, spare, work), best, result);
   if (result.path_W.size() < 2) return Status::kNoPath;
   result.reaches_goal = (result.path_W.back() - request.goal_W).norm() <= view.cell_m();
   return goal_bad ? Status::kGoalBlocked : status;

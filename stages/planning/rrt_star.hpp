@@ -45,7 +45,9 @@ class RrtStar final : public Planner {
   /// Precondition: config.validate() is kOk. Check arena.exhausted() afterwards.
   RrtStar(const Config& config, core::Arena& arena) noexcept;
 
-  /// Explored volume: distinct 4.8 m cells that hold a node, times their size.
+  /// Explored volume: distinct 4.8 m cells that hold a node, times their size. Polls the budget at every
+  /// sample and every 1,024 lookups. Whatever it says, 4,096 lookups are granted to the straight way or the
+  /// way out, and as many to shorten what was found.
   [[nodiscard]] Status plan(const PlanRequest& request, const MapView& view, core::StageBudget& budget,
                             PlanResult& result) noexcept override;
 
@@ -97,7 +99,9 @@ class RrtStar final : public Planner {
   void add_path(const Path& path_W, core::Work& work) noexcept;
 
   // It is not.
-  [[nodiscard]] Status explore(Search& s, bool goal_bad, std::int32_t best, PlanResult& result) noexcept;
+  /// `map`: what s.view polls for.
+  [[nodiscard]] Status explore(Search& s, const MapView& map, bool goal_bad, std::int32_t best,
+                               PlanResult& result) noexcept;
   [[nodiscard]] Vector3 sample(Search& s) const noexcept;
   [[nodiscard]] double promise_m(const Node& node, const Vector3& goal_W) const noexcept;
   /// What the first surface on the straight way on to the goal will cost, 0 if none is known within 12 m.

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/memory/static_vector.hpp"
+#include "stages/perception/polled_view.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -133,12 +134,13 @@ bool Smoother::solve(const Plan& plan, const TrajectoryPoint& start, Trajectory&
 }
 
 bool Smoother::stretch_to_limits(Plan& plan, const SmoothRequest& request, const MotionLimits& limits,
+                                 core::StageBudget& budget, const core::Work& work,
                                  Trajectory& out) const noexcept {
   const double speed_limit = std::max(limits.speed_mps * kLimitTolerance, request.start.v_W.norm() + 0.01);
   const double acceleration_limit =
       std::max(limits.acceleration_mps2 * kLimitTolerance, request.start.a_W.norm() + 0.01);
   const double jerk_limit = std::max(kJerk_mps3 * kLimitTolerance, request.start.j_W.norm() + 0.01);
-  for (int round = 0; round < kStretchRounds; ++round) {
+  for (int round = 0; round < kStretchRounds && !budget.spent(work); ++round) {
     if (!solve(plan, request.start, out)) return false;
     bool fine = true;
     for (std::size_t k = 0; k < out.segment_count; ++k) {
@@ -163,7 +165,7 @@ bool Smoother::stretch_to_limits(Plan& plan, const SmoothRequest& request, const
   return false;
 }
 
-Status Smoother::smooth(const SmoothRequest& request, const MapView& view, core::StageBudget& budget,
+Status Smoother::smooth(const SmoothRequest& request, const MapView& map, core::StageBudget& budget,
                         SmoothResult& result) noexcept {
   result.work = {};
   const bool finite = is_finite(request.start.p_W) && is_finite(request.start.v_W) &&
@@ -180,6 +182,7 @@ Status Smoother::smooth(const SmoothRequest& request, const MapView& view, core:
   }
   if (original.size() < 2) return Status::kInvalidArgument;
 
+  const PolledView view(map, budget, result.work);
   MotionLimits limits = request.limits;
   Trajectory candidate;
   candidate.start_time = request.start_time;
@@ -189,7 +192,7 @@ Status Smoother::smooth(const SmoothRequest& request, const MapView& view, core:
     for (int split = 0; split <= kSplitRounds; ++split) {
       if (budget.spent(result.work)) return Status::kBudgetSpent;
       if (!allocate({path.begin(), path.size()}, request.start, limits, plan)) break;
-      if (!stretch_to_limits(plan, request, limits, candidate)) break;
+      if (!stretch_to_limits(plan, request, limits, budget, result.work, candidate)) break;
       std::size_t bad = 0;
       if (is_trajectory_free(view, candidate, 0.0, request.radius_m, result.work.units, &bad)) {
         result.trajectory = candidate;
@@ -219,12 +222,14 @@ Status Smoother::smooth(const SmoothRequest& request, const MapView& view, core:
       path = finer;
     }
   }
+  if (budget.spent(result.work)) return Status::kBudgetSpent;
   if (request.start.v_W.norm() > kAtRest || request.start.a_W.norm() > kAtRest) return Status::kNoPath;
   candidate.segment_count = 0;
   for (std::size_t i = 0; i + 1 < original.size(); ++i) {
     if (!append_rest_to_rest(original[i], original[i + 1], request.limits, candidate)) return Status::kNoPath;
   }
-  if (!is_trajectory_free(view, candidate, 0.0, request.radius_m, result.work.units)) return Status::kNoPath;
+  if (!is_trajectory_free(view, candidate, 0.0, request.radius_m, result.work.units))
+    return view.spent() ? Status::kBudgetSpent : Status::kNoPath;
   result.trajectory = candidate;
   return Status::kOk;
 }

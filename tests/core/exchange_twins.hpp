@@ -82,4 +82,29 @@ class HastyRing {
   std::atomic<std::uint64_t> head_{0};
 };
 
+/// Hands over with relaxed order, as RelaxedMailbox.
+template <typename T, std::size_t N>
+class RelaxedRing {
+ public:
+  bool push(const T& value) noexcept {
+    const std::uint64_t tail = tail_.load(std::memory_order_relaxed);
+    if (tail - head_.load(std::memory_order_relaxed) == N) return false;
+    cell_[tail % N] = value;
+    tail_.store(tail + 1, std::memory_order_relaxed);
+    return true;
+  }
+  [[nodiscard]] bool pop(T& value) noexcept {
+    const std::uint64_t head = head_.load(std::memory_order_relaxed);
+    if (head == tail_.load(std::memory_order_relaxed)) return false;
+    value = cell_[head % N];
+    head_.store(head + 1, std::memory_order_relaxed);
+    return true;
+  }
+
+ private:
+  std::array<T, N> cell_{};
+  std::atomic<std::uint64_t> tail_{0};
+  std::atomic<std::uint64_t> head_{0};
+};
+
 }  // namespace roborun::core::broken

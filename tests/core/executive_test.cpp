@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/executive/lane_executive.hpp"
@@ -198,6 +199,35 @@ TEST(LaneExecutive, CutsDecisionFramesToWholeMinorFrames) {
   EXPECT_EQ(b->lane.statistics().slips, 1U);
 }
 
+TEST(FrameTable, ARateIsLegalIfItsMinorFrameIsWholeMicrosecondsFrom2500To10000) {
+  int legal = 0;
+  for (int rate_Hz = -1; rate_Hz <= 2000; ++rate_Hz) {
+    if (!is_flight_rate(rate_Hz)) continue;
+    ++legal;
+    EXPECT_EQ(minor_frame_of(rate_Hz) * rate_Hz, Nanos{1'000'000'000});
+    EXPECT_EQ(minor_frame_of(rate_Hz).count() % 1000, 0);
+    EXPECT_GE(minor_frame_of(rate_Hz), kMinorFrame) << "the budgets of the flight lane fit into kMinorFrame";
+  }
+  EXPECT_EQ(legal, 7);
+  EXPECT_EQ(minor_frame_of(400), kMinorFrame);
+}
+
+TEST(LaneExecutive, KeepsTheGridOfTheRateItIsStartedWith) {
+  for (const LaneId id : {LaneId::kFlight, LaneId::kDecision}) {
+    auto b = std::make_unique<Bench>(id);
+    b->lane.start(MonotonicTime{us(8000)}, us(8000));
+    for (int i = 0; i < 5; ++i) b->frame();
+    EXPECT_EQ(b->lane.release(), MonotonicTime{us(48'000)});
+    b->script.period = us(17'000);
+    b->frame();
+    EXPECT_EQ(b->lane.release(), MonotonicTime{us(id == LaneId::kDecision ? 72'000 : 56'000)});
+  }
+  auto background = std::make_unique<Bench>(LaneId::kBackground);
+  background->lane.start(MonotonicTime{us(8000)}, us(8000));
+  background->frame();
+  EXPECT_EQ(background->lane.release(), MonotonicTime{us(13'000)}) << "its own";
+}
+
 TEST(LaneExecutive, TellsTheTraceEverySlot) {
   auto b = std::make_unique<Bench>(LaneId::kFlight);
   b->cost(SlotId::kCommit) = us(101);
@@ -210,6 +240,47 @@ TEST(LaneExecutive, TellsTheTraceEverySlot) {
   }
   EXPECT_EQ(slots, (std::vector<SlotId>{SlotId::kWorld, SlotId::kSense, SlotId::kCommit, SlotId::kTrack,
                                         SlotId::kPublish}));
+}
+
+/// What the watchdog asks while a slot still runs and its frame has not been judged.
+class Watched final : public LaneProgram {
+ public:
+  explicit Watched(VirtualClock& clock) : clock_(clock) {}
+  void run(SlotId slot, LaneExecutive& lane) noexcept override {
+    if (slot != hangs) return;
+    if (granted > Nanos{0}) (void)lane.grant(slot, granted);
+    const MonotonicTime begin = clock_.now();
+    const Nanos budget = granted > Nanos{0} ? granted : roborun::core::slot(slot).budget;
+    last_good = lane.overdue(begin + budget + kWatchdogPatience);
+    first_bad = lane.overdue(begin + budget + kWatchdogPatience + Nanos{1});
+  }
+  SlotId hangs{};
+  Nanos granted{0};
+  std::optional<SlotId> last_good, first_bad;
+
+ private:
+  VirtualClock& clock_;
+};
+
+TEST(LaneExecutive, SaysInWhichSlotItHangsWhileItHangs) {
+  for (const SlotSpec& spec : kFrameTable) {
+    for (const Nanos granted : {Nanos{0}, us(50)}) {
+      VirtualClock clock;
+      Watched program(clock);
+      program.hangs = spec.id;
+      program.granted = granted;
+      Reactions reactions;
+      const auto lane = std::make_unique<LaneExecutive>(spec.lane, clock, program, reactions, nullptr);
+      lane->start(MonotonicTime{kMinorFrame});
+      clock.set(MonotonicTime{kMinorFrame});
+      lane->run_frame();
+      EXPECT_EQ(program.last_good, std::nullopt) << spec.name;
+      EXPECT_EQ(program.first_bad, spec.id) << spec.name;
+      // Asleep until the next release; one that never wakes up is overdue too.
+      EXPECT_EQ(lane->overdue(lane->release() + kWatchdogPatience), std::nullopt);
+      EXPECT_TRUE(lane->overdue(lane->release() + kWatchdogPatience + Nanos{1}).has_value());
+    }
+  }
 }
 
 TEST(LaneExecutive, DoesNotAllocate) {

@@ -5,6 +5,7 @@
 
 #include <limits>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "stages/perception/brick_map.hpp"
@@ -137,6 +138,48 @@ TEST(Exhaustion, OfPlannerNodesStillGivesOnlyFreePaths) {
   ASSERT_EQ(paths, 1U);
   EXPECT_GT(at_every_allocation(run), 40U);
   EXPECT_GT(paths, 10U);
+}
+
+/// The plan of a flight is that of these three: whatever hands out elements while it runs is refused them
+/// above, all other pools are tables that belong to it whole.
+TEST(Exhaustion, EveryPoolThatHandsOutElementsWasRefusedThem) {
+  test::Scene scene;
+  scene.solid = {{Vector3(-12, -12, -1), Vector3(12, 12, 0)}, {Vector3(3, -1, 0), Vector3(4, 1, 6)}};
+  const Vector3 at(0.1, 0.2, 2.0);
+  const auto frames = scene.look(at, 16, 9.0F);
+  const std::array<Vector3, 1> here{at};
+  BrickMap::Config config;
+  config.bounds_W = {Vector3(-12, -12, -3), Vector3(12, 12, 7)};
+  config.max_bricks = 256;
+  config.max_image_side = 32;
+  std::vector<std::byte> block(BrickMap::arena_bytes(config) + PointCloud::arena_bytes({}) +
+                               RrtStar::arena_bytes({}) + 4096);
+  core::Arena arena(block);
+  PointCloud cloud({}, arena);
+  BrickMap map(config, arena);
+  RrtStar planner({}, arena);
+  ASSERT_FALSE(arena.exhausted());
+  core::UnlimitedBudget unlimited;
+  core::Work work;
+  IntegrationResult integrated;
+  (void)cloud.step(frames, 0, unlimited, work);
+  (void)map.integrate({frames, 0, kInfinity, here}, unlimited, integrated);
+  (void)map.export_view({0, kInfinity, at}, unlimited, work);
+  PlanRequest request;
+  request.start_W = at;
+  request.goal_W = Vector3(50, 0, 2);
+  request.bounds_W = config.bounds_W;
+  request.radius_m = 0.3;
+  request.volume_m3 = 1e9;
+  request.horizon_m = 24.0;
+  PlanResult planned;
+  (void)planner.plan(request, map.view(), unlimited, planned);
+  std::vector<std::string> handing_out;
+  for (const core::PoolRecord& pool : arena.plan()) {
+    if (pool.allocations > 0) handing_out.emplace_back(pool.name);
+  }
+  EXPECT_GT(arena.plan().size(), 8U);
+  EXPECT_EQ(handing_out, (std::vector<std::string>{"cloud points", "map bricks", "planner nodes"}));
 }
 
 /// The start-up pools: a block that is any number of bytes too small is refused whole.

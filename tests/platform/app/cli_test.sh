@@ -29,6 +29,10 @@ refuses "cannot be opened" explain nope.csv --at 3
 refuses "no column" explain "$data/worlds/two_pillars.toml" --at 3
 refuses "cannot be written" fly --trace /nonexistent/x.csv
 refuses "cannot be written" fly --plot /
+refuses "cannot be written" fly --record /nonexistent/x.rec
+refuses "must go with one --design" fly --design aware,static --record x.rec
+refuses "cannot be opened" replay nope.rec
+refuses "no record of a flight" replay "$data/worlds/two_pillars.toml"
 refuses "not JSON" solve
 refuses "cannot be written" calibrate --repeats 1 --out /nonexistent/x.toml
 refuses "whole number" fly --seed -1
@@ -48,6 +52,10 @@ refuses "cannot be opened" can decode --candump nope.log
 refuses "required" gpio check --open x
 refuses "subcommand" 
 refuses "1 to 86400" audit --seconds 0
+refuses "100, 125, 160, 200, 250, 320 or 400" audit --rate 333
+refuses "100, 125, 160, 200, 250, 320 or 400" audit --rate 1000
+refuses "100, 125, 160, 200, 250, 320 or 400" audit --rate -400
+refuses "--rate" audit --rate fast
 refuses "SLOT:MILLISECONDS" audit --inject-spin nope:5
 refuses "cannot be opened" audit --compare nope.json nope.json
 refuses "is not the JSON of an audit" audit --compare "$data/worlds/two_pillars.toml" "$data/worlds/two_pillars.toml"

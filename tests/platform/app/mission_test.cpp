@@ -71,6 +71,21 @@ TEST(Mission, EveryDesignFliesPastTwoPillars) {
   }
 }
 
+TEST(Mission, FliesAtEveryRateOfTheFlightLane) {
+  const sitl::World world = sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {});
+  int flown = 0;
+  for (int rate_Hz = 1; rate_Hz <= 1000; ++rate_Hz) {
+    if (!core::is_flight_rate(rate_Hz)) continue;
+    MissionConfig config = paper_mission(governor::Design::kAware, 1);
+    config.minor_frame = core::minor_frame_of(rate_Hz);
+    const report::MissionReport report = fly_mission(world, config, {});
+    EXPECT_TRUE(report.result.reached_goal) << rate_Hz << " Hz: " << report.result.reason;
+    EXPECT_FALSE(report.result.collided) << rate_Hz << " Hz";
+    ++flown;
+  }
+  EXPECT_EQ(flown, 7);
+}
+
 TEST(Mission, EveryBackendFlies) {
   const sitl::World world = sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {});
   for (const auto& [map, planner] : {std::pair{"octomap", "own"}, std::pair{"own", "ompl:RRTstar"}}) {

@@ -69,6 +69,28 @@ TEST_F(RealTimeRun, AStageThatSpinsInTheDecisionLaneTakesNoFrameFromTheFlightLan
   EXPECT_GT(flight.frames, 1000U) << "of 1,600; 800 fell into the fault";
 }
 
+TEST_F(RealTimeRun, WhereADecisionNeverEndsTheFlightLaneStopsTheVehicleAndGoesOn) {
+  config.seconds = 16.0;
+  config.inject = Injection{core::SlotId::kMap, Nanos{3'600'000'000'000}, 3, 1, false};
+  const report::AuditReport r = run_real_time(world, config, {});
+  ASSERT_EQ(r.decisions, 4U) << "the fourth one is the last";
+  EXPECT_EQ(r.decision_stalls, 1U);
+  EXPECT_EQ(r.stalled_in, "map");
+  EXPECT_EQ(r.stopped_by, "") << "the flight lane is well";
+  EXPECT_GT(lane(r, core::LaneId::kFlight).frames, 4800U) << "of 6,400";
+  EXPECT_GT(r.flown_m, 2.0) << "it never left: nothing was tested";
+  EXPECT_LT(r.speed_mps, 0.5) << "the committed trajectory ends in a stop";
+  EXPECT_GT(r.least_clearance_m, 0.6);
+}
+
+TEST_F(RealTimeRun, AFlightLaneThatHangsEndsTheRunByName) {
+  config.seconds = 30.0;
+  config.inject = Injection{core::SlotId::kTrack, Nanos{3'600'000'000'000}, 100, 1, false};
+  const report::AuditReport r = run_real_time(world, config, {});
+  EXPECT_EQ(r.stopped_by, "track");
+  EXPECT_LT(r.seconds, 29.0);
+}
+
 TEST_F(RealTimeRun, NoCatchUpAfterAStallInTheFlightLane) {
   config.seconds = 2.0;
   config.inject = Injection{core::SlotId::kTrack, Nanos{100'000'000}, 100, 1, false};
@@ -79,6 +101,16 @@ TEST_F(RealTimeRun, NoCatchUpAfterAStallInTheFlightLane) {
   EXPECT_GE(slot(r, core::SlotId::kTrack).overruns, 1U);
   EXPECT_LT(slot(r, core::SlotId::kTrack).margin_ratio, 0.0);
   EXPECT_EQ(r.stopped_by, "") << "one overrun is not four hundred";
+}
+
+TEST_F(RealTimeRun, FliesAtTheRateAskedFor) {
+  config.seconds = 2.0;
+  config.mission.minor_frame = core::minor_frame_of(100);
+  const report::AuditReport r = run_real_time(world, config, {});
+  const report::AuditLane& flight = lane(r, core::LaneId::kFlight);
+  EXPECT_EQ(r.rate_Hz, 100.0);
+  EXPECT_GT(flight.frames, 100U);
+  EXPECT_LE(flight.frames + flight.slips, 210U) << "2 s and what starting and stopping takes";
 }
 
 TEST_F(RealTimeRun, ATrackerThatIsAlwaysLateStopsTheRun) {

@@ -42,6 +42,13 @@ TEST(Pwcet, RefusesMostSamplesOfOtherKindsAndSaysWhy) {
   std::vector<double> two_paths = gumbel_us(400, 100.0, 1.0, 7);
   core::CounterRng rng(8, 1);
   for (double& x : two_paths) x += rng.uniform() < 0.5 ? 80.0 : 0.0;
+  // The same median in both halves, so that only the comparison of halves can see it.
+  std::vector<double> spreading = gumbel_us(800, 100.0, 2.0, 10);
+  for (std::size_t i = 400; i < 800; ++i) spreading[i] = 100.7 + 8.0 * (spreading[i] - 100.7);
+  EXPECT_NE(fit_pwcet(alternating).verdict.find("not independent"), std::string::npos);
+  EXPECT_NE(fit_pwcet(spreading).verdict.find("not stationary"), std::string::npos)
+      << fit_pwcet(spreading).verdict;
+  EXPECT_NE(fit_pwcet(two_paths).verdict.find("no Gumbel"), std::string::npos);
   EXPECT_NE(fit_pwcet(gumbel_us(99, 1.0, 1.0, 1)).verdict.find("100 are needed"), std::string::npos);
   EXPECT_NE(fit_pwcet(std::vector<double>(200, 5.0)).verdict.find("refused"), std::string::npos);
   for (const auto& sample : {drifting, alternating, two_paths}) {
@@ -89,7 +96,7 @@ TEST(AuditReport, HasTheKeysThatMachinesRead) {
   EXPECT_EQ(j.at("page_faults").at("minor"), 0) << "the background lane is not real-time";
   EXPECT_EQ(j.at("page_faults").at("major"), 0);
   EXPECT_EQ(j.at("locked_bytes"), 61'000'000);
-  ASSERT_EQ(j.at("lanes").size(), 3U);
+  ASSERT_EQ(j.at("lanes").size(), core::kLaneCount);
   for (const char* key : {"name", "frames", "slips", "deadline_misses"})
     EXPECT_TRUE(j["lanes"][0].contains(key));
   for (const char* key : {"p99", "p999", "max"}) EXPECT_TRUE(j["lanes"][0]["wakeup_jitter_us"].contains(key));
@@ -109,7 +116,7 @@ TEST(AuditReport, HtmlNeedsNothingFromOutsideAndEscapesText) {
   EXPECT_NE(html.find("&lt;few&gt; &amp; far"), std::string::npos);
   std::size_t plots = 0;
   for (std::size_t at = html.find("<svg"); at != std::string::npos; at = html.find("<svg", at + 1)) ++plots;
-  EXPECT_EQ(plots, 3 + core::kSlotCount);
+  EXPECT_EQ(plots, core::kLaneCount + core::kSlotCount);
   EXPECT_EQ(html.find("nan"), std::string::npos);
 }
 

@@ -156,10 +156,10 @@ TEST(Estimator, KnowsWhereItWas) {
   Circle circle;
   run(estimator, circle, 0.0, 20.0);
   Pose X_WB{};
-  ASSERT_EQ(estimator.pose_at(at(19.8), X_WB), Status::kOk);
+  ASSERT_EQ(estimator.past().pose_at(at(19.8), X_WB), Status::kOk);
   EXPECT_LT((X_WB.p_RT - Circle::p_W(19.8)).norm(), 0.1);
-  EXPECT_EQ(estimator.pose_at(at(19.0), X_WB), Status::kStale);
-  EXPECT_EQ(estimator.pose_at(at(21.0), X_WB), Status::kStale);
+  EXPECT_EQ(estimator.past().pose_at(at(19.0), X_WB), Status::kStale);
+  EXPECT_EQ(estimator.past().pose_at(at(21.0), X_WB), Status::kStale);
 }
 
 TEST(Estimator, TheBarometerHoldsTheHeightWithoutGnss) {

@@ -423,9 +423,10 @@ TEST_F(BrickMapTest, PointCloudAveragesAndProfilesGaps) {
   (void)sut_->integrate({frames, 0, kInfinity, here}, unlimited_, result_);
   (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
   SpaceProfile profile;
-  std::uint64_t lookups = 0;
-  profile_space({}, cloud.points(), sut_->view(), Trajectory::hold(at_, {}), {}, at_, Vector3::Zero(),
-                Vector3(20, 0, 5), {Vector3(-30, -30, 1), Vector3(30, 30, 12)}, 0.6, profile, lookups);
+  ASSERT_EQ(profile_space({}, cloud.points(), sut_->view(), Trajectory::hold(at_, {}), {}, at_,
+                          Vector3::Zero(), Vector3(20, 0, 5), {Vector3(-30, -30, 1), Vector3(30, 30, 12)},
+                          0.6, profile, unlimited_, work),
+            Status::kOk);
   EXPECT_NEAR(profile.closest_obstacle_m, 5.9, 0.2) << "the front of the nearer pillar";
   // The gap between the corners (6, 2) and (-7, 4): 13.2 m; the other way round is wider than 20 m or between
   // the same.
