@@ -22,10 +22,13 @@ Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& bu
   for (std::int32_t bz = 0; bz < nz_; ++bz) {
     for (std::int32_t by = 0; by < ny_; ++by) {
       for (std::int32_t bx = 0; bx < nx_; ++bx, ++position) {
-        const Brick* brick = brick_at(position);
-        if (brick == nullptr || brick->known_count == 0) continue;
+        const std::int32_t slot = slot_[position];
+        const std::size_t count = slot == kFreeBrick ? kCellsPerBrick
+                                  : slot >= 0        ? known_count_[static_cast<std::size_t>(slot)]
+                                                     : 0;
+        if (count == 0) continue;
         const double distance_m = (brick_center_W(bx, by, bz) - view_center_W_).norm();
-        known[std::min(static_cast<std::size_t>(distance_m / kBucket_m), kBuckets - 1)] += brick->known_count;
+        known[std::min(static_cast<std::size_t>(distance_m / kBucket_m), kBuckets - 1)] += count;
         if (++work.units % 1024 == 0 && budget.spent(work)) {
           // Too late to know what fits: only the nearest space is safe to promise.
           view_radius_m_ = kBrick_m;
