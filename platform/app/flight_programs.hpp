@@ -86,8 +86,7 @@ class FlightProgram final : public core::LaneProgram {
   [[nodiscard]] governor::Phase phase() const noexcept { return phase_; }
   [[nodiscard]] governor::Action action() const noexcept { return action_; }
   [[nodiscard]] MonotonicTime action_since() const noexcept { return action_since_; }
-  [[nodiscard]] governor::ConditionSet conditions() const noexcept { return conditions_; }
-  /// One for each change of the action, at most six: an action is never taken back.
+  /// One for each change of the action; in the air at most five, because none is taken back.
   [[nodiscard]] std::span<const FailsafeEvent> events() const noexcept {
     return {events_.begin(), events_.size()};
   }

@@ -46,7 +46,7 @@ Status BrickMap::Config::validate() const noexcept {
 std::size_t BrickMap::arena_bytes(const Config& config) noexcept {
   const std::size_t positions = position_count(config.bounds_W);
   return positions * (2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
-         config.max_bricks * (sizeof(Brick) + 2 * sizeof(std::uint32_t)) +
+         config.max_bricks * (sizeof(Brick) + 2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
          config.max_frames * DepthPyramid::arena_bytes(config.max_image_side) +
          16 * alignof(std::max_align_t);
 }
@@ -65,6 +65,7 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
   brick_pool_ = &arena.last_pool();
   free_list_ = arena.take<std::uint32_t>(config.max_bricks, "map free list");
   dirty_ = arena.take<std::uint32_t>(config.max_bricks, "map dirty list");
+  known_count_ = arena.take<std::uint16_t>(config.max_bricks, "map known counts");
   std::fill(slot_.begin(), slot_.end(), kUnknownBrick);
   free_brick_.fill(evidence::kFree);
   surface_brick_.fill(evidence::kUnknown);
@@ -130,6 +131,7 @@ Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexce
     fresh.y = by;
     fresh.z = bz;
     fresh.dirty = false;
+    known_count_[static_cast<std::size_t>(slot)] = fresh.known_count;
   }
   Brick& brick = brick_[static_cast<std::size_t>(slot)];
   if (!brick.dirty && dirty_count_ < dirty_.size()) {
@@ -189,6 +191,7 @@ void BrickMap::refresh(Brick& brick) noexcept {
   known_cells_ -= brick.known_count;
   brick.refresh();
   known_cells_ += brick.known_count;
+  known_count_[static_cast<std::size_t>(&brick - brick_.data())] = brick.known_count;
 }
 
 void BrickMap::refresh_dirty() noexcept {

@@ -167,8 +167,9 @@ class BrickMap final : public OccupancyMap, private MapView {
   core::PoolRecord* brick_pool_{nullptr};
   std::span<std::uint32_t> free_list_;
   std::span<std::uint32_t> dirty_;
-  std::span<std::uint32_t> order_;      ///< Units near the cameras, nearest to the trajectory first.
-  std::span<std::uint16_t> order_key_;  ///< Of each unit of the map.
+  std::span<std::uint16_t> known_count_;  ///< Of each brick, once more: an export reads them all.
+  std::span<std::uint32_t> order_;        ///< Units near the cameras, nearest to the trajectory first.
+  std::span<std::uint16_t> order_key_;    ///< Of each unit of the map.
   int unit_level_{kBrickLevel};
   std::size_t free_count_{0};
   std::size_t dirty_count_{0};

@@ -25,11 +25,14 @@ Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& bu
         // Too late to know what fits: the radius of the view before stays, around the new centre. What is
         // known is as true as ever, v1 only saves the planner work.
         if (position % 1024 == 1023 && budget.spent(work)) return Status::kBudgetSpent;
-        const Brick* brick = brick_at(position);
-        if (brick == nullptr || brick->known_count == 0) continue;
+        const std::int32_t slot = slot_[position];
+        const std::size_t count = slot == kFreeBrick ? kCellsPerBrick
+                                  : slot >= 0        ? known_count_[static_cast<std::size_t>(slot)]
+                                                     : 0;
+        if (count == 0) continue;
         ++work.units;
         const double distance_m = (brick_center_W(bx, by, bz) - view_center_W_).norm();
-        known[std::min(static_cast<std::size_t>(distance_m / kBucket_m), kBuckets - 1)] += brick->known_count;
+        known[std::min(static_cast<std::size_t>(distance_m / kBucket_m), kBuckets - 1)] += count;
       }
     }
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -20,7 +21,7 @@ constexpr int kDepth = kOctomapDepth;
 constexpr double kMaxVoxels = 4e9;  // bits of the dense grid: 512 MB
 
 struct Leaf {
-  std::array<std::int64_t, 3> first;
+  std::uint64_t morton;
   std::int64_t size;
 };
 
@@ -69,14 +70,13 @@ Header parse_header(std::span<const unsigned char> bytes, bool full, const std::
   refuse(name, "OctoMap header too long: no 'data' line");
 }
 
-/// Walks the tree in file order with an explicit stack and calls leaf(first, size, occupied).
+/// Walks the tree in file order with an explicit stack and calls on_leaf(leaf, occupied).
 template <typename LeafFunction>
 void walk(std::span<const unsigned char> data, bool full, const std::string& name, LeafFunction&& on_leaf) {
   struct Frame {
-    std::array<std::int64_t, 3> first;
+    std::uint64_t morton;
     int depth;
-    unsigned children;  // .bt: two bits a child; .ot: one bit a child
-    unsigned next;
+    unsigned rest;  // children still to come; .bt: two bits a child; .ot: one bit a child
   };
   std::size_t at = 0;
   const auto need = [&](std::size_t count) {
@@ -100,50 +100,36 @@ void walk(std::span<const unsigned char> data, bool full, const std::string& nam
   unsigned root = 0;
   if (data.empty()) return;
   read_node(root);
-  stack[0] = {{0, 0, 0}, 0, root, 0};
-  if (full && root == 0) on_leaf(Leaf{{0, 0, 0}, std::int64_t{1} << kDepth}, value > 0.0F);
+  stack[0] = {0, 0, root};
+  if (full && root == 0) on_leaf(Leaf{0, std::int64_t{1} << kDepth}, value > 0.0F);
   while (top >= 0) {
     Frame& frame = stack[static_cast<std::size_t>(top)];
-    if (frame.next == 8 || (full && frame.children == 0)) {
+    if (frame.rest == 0) {
       --top;
       continue;
     }
-    const unsigned child = frame.next++;
+    const auto child = static_cast<unsigned>(
+                           std::countr_zero(full ? frame.rest : (frame.rest | frame.rest >> 1U) & 0x5555U)) /
+                       (full ? 1U : 2U);
+    const unsigned code = full ? 3U : (frame.rest >> (2U * child)) & 3U;  // .bt: 1 free, 2 occupied, 3 inner
+    frame.rest &= ~(full ? 1U << child : 3U << (2U * child));
     const int depth = frame.depth + 1;
     const std::int64_t size = std::int64_t{1} << (kDepth - depth);
-    const std::array<std::int64_t, 3> first{frame.first[0] + ((child & 1U) != 0 ? size : 0),
-                                            frame.first[1] + ((child & 2U) != 0 ? size : 0),
-                                            frame.first[2] + ((child & 4U) != 0 ? size : 0)};
-    if (full) {
-      if (((frame.children >> child) & 1U) == 0) continue;
-      if (depth > kDepth) refuse(name, "OctoMap data deeper than 16 levels");
-      unsigned children = 0;
-      read_node(children);
-      if (children == 0) {
-        on_leaf(Leaf{first, size}, value > 0.0F);
-        continue;
-      }
-      if (depth == kDepth) refuse(name, "OctoMap data deeper than 16 levels");
-      stack[static_cast<std::size_t>(++top)] = {first, depth, children, 0};
+    // The number of a child is its digit of the Morton index.
+    const std::uint64_t morton = frame.morton + (std::uint64_t{child} << (3 * (kDepth - depth)));
+    if (code != 3U) {
+      on_leaf(Leaf{morton, size}, code == 2U);
       continue;
     }
-    // .bt: all children of a node come before any grandchild in the bits, but depth first in the file.
-    switch ((frame.children >> (2U * child)) & 3U) {
-      case 0U:
-        break;  // unknown
-      case 1U:
-        on_leaf(Leaf{first, size}, false);
-        break;  // free (bit order: low bit first)
-      case 2U:
-        on_leaf(Leaf{first, size}, true);
-        break;  // occupied
-      default: {
-        if (depth >= kDepth) refuse(name, "OctoMap data deeper than 16 levels");
-        unsigned children = 0;
-        read_node(children);
-        stack[static_cast<std::size_t>(++top)] = {first, depth, children, 0};
-      }
+    if (!full && depth >= kDepth) refuse(name, "OctoMap data deeper than 16 levels");
+    unsigned children = 0;
+    read_node(children);
+    if (full && children == 0) {
+      on_leaf(Leaf{morton, size}, value > 0.0F);
+      continue;
     }
+    if (depth == kDepth) refuse(name, "OctoMap data deeper than 16 levels");
+    stack[static_cast<std::size_t>(++top)] = {morton, depth, children};
   }
   if (at != data.size())
     refuse(name, fmt::format("{} bytes after the end of the OctoMap tree", data.size() - at));
@@ -157,10 +143,7 @@ OctomapLeaves read_octomap(std::span<const unsigned char> bytes, bool full, cons
   map.resolution_m = header.resolution_m;
   // File order is Morton order, because children come by number: x, then y, then z.
   walk(bytes.subspan(header.data), full, name, [&](const Leaf& leaf, bool occupied) {
-    map.leaves.push_back(
-        {octomap_morton({static_cast<std::int32_t>(leaf.first[0]), static_cast<std::int32_t>(leaf.first[1]),
-                         static_cast<std::int32_t>(leaf.first[2])}),
-         static_cast<std::int32_t>(leaf.size), occupied});
+    map.leaves.push_back({leaf.morton, static_cast<std::int32_t>(leaf.size), occupied});
   });
   if (map.leaves.empty()) refuse(name, "the OctoMap tree is empty: no leaf is known");
   return map;
@@ -176,9 +159,10 @@ VoxelGrid parse_octomap(std::span<const unsigned char> bytes, bool full, const s
   std::size_t leaves = 0;
   walk(data, full, name, [&](const Leaf& leaf, bool) {
     ++leaves;
+    const std::array<std::int32_t, 3> first = octomap_cell(leaf.morton);
     for (std::size_t i = 0; i < 3; ++i) {
-      low[i] = std::min(low[i], leaf.first[i]);
-      high[i] = std::max(high[i], leaf.first[i] + leaf.size);
+      low[i] = std::min<std::int64_t>(low[i], first[i]);
+      high[i] = std::max(high[i], first[i] + leaf.size);
     }
   });
   if (leaves == 0) refuse(name, "the OctoMap tree is empty: no leaf is known");
@@ -196,8 +180,9 @@ VoxelGrid parse_octomap(std::span<const unsigned char> bytes, bool full, const s
                                                       static_cast<double>(low[2] - kCentre));
   VoxelGrid grid(min_W, header.resolution_m, count);
   walk(data, full, name, [&](const Leaf& leaf, bool occupied) {
-    if (occupied)
-      grid.fill({leaf.first[0] - low[0], leaf.first[1] - low[1], leaf.first[2] - low[2]}, leaf.size);
+    if (!occupied) return;
+    const std::array<std::int32_t, 3> first = octomap_cell(leaf.morton);
+    grid.fill({first[0] - low[0], first[1] - low[1], first[2] - low[2]}, leaf.size);
   });
   return grid;
 }

@@ -23,6 +23,22 @@ struct Subtree {
 
 std::uint64_t cells_at(int depth) { return kSpace >> (3 * depth); }
 
+/// Sixteen bits to every third place, and back: halves move apart, then quarters, and so on.
+std::uint64_t spread(std::uint64_t bits) {
+  bits = (bits | bits << 16U) & 0xFF0000FFU;
+  bits = (bits | bits << 8U) & 0xF00F00F00FU;
+  bits = (bits | bits << 4U) & 0xC30C30C30C3U;
+  return (bits | bits << 2U) & 0x249249249249U;
+}
+
+std::uint64_t gather(std::uint64_t bits) {
+  bits &= 0x249249249249U;
+  bits = (bits | bits >> 2U) & 0xC30C30C30C3U;
+  bits = (bits | bits >> 4U) & 0xF00F00F00FU;
+  bits = (bits | bits >> 8U) & 0xFF0000FFU;
+  return (bits | bits >> 16U) & 0xFFFFU;
+}
+
 void put_float(std::string& out, float value) {
   std::array<char, sizeof value> bytes{};
   std::memcpy(bytes.data(), &value, sizeof value);
@@ -79,18 +95,14 @@ std::size_t put_nodes(const std::vector<OctomapLeaf>& leaves, bool full, std::st
 
 std::array<std::int32_t, 3> octomap_cell(std::uint64_t morton) noexcept {
   std::array<std::int32_t, 3> cell{};
-  for (unsigned bit = 0; bit < kOctomapDepth; ++bit)
-    for (unsigned axis = 0; axis < 3; ++axis)
-      cell[axis] |= static_cast<std::int32_t>((morton >> (3U * bit + axis)) & 1U) << bit;
+  for (unsigned axis = 0; axis < 3; ++axis) cell[axis] = static_cast<std::int32_t>(gather(morton >> axis));
   return cell;
 }
 
 std::uint64_t octomap_morton(const std::array<std::int32_t, 3>& cell) noexcept {
   std::uint64_t morton = 0;
-  for (unsigned bit = 0; bit < kOctomapDepth; ++bit)
-    for (unsigned axis = 0; axis < 3; ++axis)
-      morton |= ((static_cast<std::uint64_t>(static_cast<std::uint32_t>(cell[axis])) >> bit) & 1U)
-                << (3U * bit + axis);
+  for (unsigned axis = 0; axis < 3; ++axis)
+    morton |= spread(static_cast<std::uint64_t>(cell[axis]) & 0xFFFFU) << axis;
   return morton;
 }
 

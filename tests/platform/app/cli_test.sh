@@ -60,6 +60,10 @@ refuses "SLOT:MILLISECONDS" audit --inject-spin nope:5
 refuses "cannot be opened" audit --compare nope.json nope.json
 refuses "is not the JSON of an audit" audit --compare "$data/worlds/two_pillars.toml" "$data/worlds/two_pillars.toml"
 refuses "1 .. 27" memory --env 99
+refuses "cannot be opened" scenario run nope.toml
+refuses "must hold .toml files" scenario run "$data"
+refuses "unknown key in the file" scenario run "$data/worlds"
+refuses "whole number from 1 to 1024" scenario run "$data" --jobs 0
 # Without privileges real time is refused by name, and only --best-effort runs on.
 if [[ $(id -u) -eq 0 ]] && command -v setpriv >/dev/null && [[ $(ulimit -r) -eq 0 ]]; then
   copy=$(mktemp -d) && chmod 755 "$copy" && cp "$roborun" "$copy/roborun"
