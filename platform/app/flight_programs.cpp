@@ -274,10 +274,10 @@ void DecisionProgram::hand_over(const core::LaneExecutive& lane) noexcept {
 
 void WatchdogProgram::run(SlotId, core::LaneExecutive& lane) noexcept {
   const MonotonicTime now = lane.now();
-  const std::optional<SlotId> flight = flight_.overdue(now);
+  const std::optional<SlotId> flight = flight_->overdue(now);
   if (flight && flight_late_) lane.reactions().stop(*flight);
   flight_late_ = flight.has_value();
-  const std::optional<SlotId> decision = decision_.overdue(now);
+  const std::optional<SlotId> decision = decision_->overdue(now);
   if (braking_ && !decision) {
     lane.reactions().brake(*stalled_, false);
     braking_ = false;

@@ -173,8 +173,11 @@ class DecisionProgram final : public core::LaneProgram {
 /// ends in its stop.
 class WatchdogProgram final : public core::LaneProgram {
  public:
-  WatchdogProgram(const core::LaneExecutive& flight, const core::LaneExecutive& decision)
-      : flight_(flight), decision_(decision) {}
+  /// Before the first frame.
+  void watch(const core::LaneExecutive& flight, const core::LaneExecutive& decision) noexcept {
+    flight_ = &flight;
+    decision_ = &decision;
+  }
   void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override;
   /// Times that the decision lane hung; never decreases.
   [[nodiscard]] std::uint64_t stalls() const noexcept { return stalls_; }
@@ -182,8 +185,8 @@ class WatchdogProgram final : public core::LaneProgram {
   [[nodiscard]] std::optional<core::SlotId> stalled() const noexcept { return stalled_; }
 
  private:
-  const core::LaneExecutive& flight_;
-  const core::LaneExecutive& decision_;
+  const core::LaneExecutive* flight_{nullptr};
+  const core::LaneExecutive* decision_{nullptr};
   bool flight_late_{false};
   bool decision_late_{false};
   bool braking_{false};

@@ -127,7 +127,6 @@ RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
       cameras_(world, config.mission.camera, config.mission.seed),
       aircraft_(world, config.mission, cameras_),
       system_(world, config.mission, meter_, aircraft_, cameras_.cameras()),
-      watchdog_(lane_[0], lane_[1]),
       program_{Injected{system_.flight_program(), config.inject, over_},
                Injected{system_.decision_program(), config.inject, over_},
                Injected{cameras_, config.inject, over_}, Injected{watchdog_, config.inject, over_}},
@@ -142,6 +141,7 @@ RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
       thread_{rt::LaneThread(lane_[0], clock_), rt::LaneThread(lane_[1], clock_),
               rt::LaneThread(lane_[2], clock_), rt::LaneThread(lane_[3], clock_)} {
   meter_.attach(lane_[1]);
+  watchdog_.watch(lane_[0], lane_[1]);
 }
 
 void RealTimeRun::start_threads() {
