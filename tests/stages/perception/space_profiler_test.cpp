@@ -20,9 +20,11 @@ class SpaceProfilerTest : public ::testing::Test {
  protected:
   SpaceProfilerTest() { view_.free_W = {Vector3(-40, -40, 0), Vector3(3, 40, 12)}; }
   const SpaceProfile& profile(const Vector3& v_WB, const Trajectory& committed) {
-    std::uint64_t lookups = 0;
-    profile_space(SpaceProfilerConfig{}, points_, view_, committed, {}, p_WB_, v_WB, goal_W_, relevant_W_,
-                  kRadius_m, profile_, lookups);
+    core::UnlimitedBudget budget;
+    core::Work work;
+    EXPECT_EQ(profile_space(SpaceProfilerConfig{}, points_, view_, committed, {}, p_WB_, v_WB, goal_W_,
+                            relevant_W_, kRadius_m, profile_, budget, work),
+              Status::kOk);
     return profile_;
   }
   static Trajectory straight(const Vector3& from_W, const Vector3& v_W, double duration_s) {
