@@ -18,7 +18,7 @@ LatencyModel from_eq4(const Eq4& eq4, double finest_m) noexcept {
   for (int level = 0; level < kPrecisionLevels; ++level) {
     const double r = 1.0 / (finest_m * static_cast<double>(1 << level));
     const auto i = static_cast<std::size_t>(level);
-    model.fixed_s[i] = std::max(eq4.constant_s, 0.0);
+    model.fixed_s[i] = std::max(eq4.constant_s + eq4.fixed_sm * r, 0.0);
     model.slope_s_per_m3[i] =
         std::max(((eq4.q[0] * r + eq4.q[1]) * r + eq4.q[2]) * r * eq4.q[3] + eq4.per_m3_s, 0.0);
   }
@@ -28,21 +28,21 @@ LatencyModel from_eq4(const Eq4& eq4, double finest_m) noexcept {
 LatencyModel from_cost(const core::StageCost& cost) noexcept { return {cost.fixed_s, cost.per_m3_s}; }
 
 Eq4 fit_eq4(std::span<const LatencyPoint> points) noexcept {
-  constexpr int kTerms = 5;
-  using Vector5 = Eigen::Matrix<double, kTerms, 1>;
-  using Matrix5 = Eigen::Matrix<double, kTerms, kTerms>;
-  const auto row_of = [](const LatencyPoint& point) -> Vector5 {
+  constexpr int kTerms = 6;
+  using Terms = Eigen::Matrix<double, kTerms, 1>;
+  using Normal = Eigen::Matrix<double, kTerms, kTerms>;
+  const auto row_of = [](const LatencyPoint& point) -> Terms {
     const double r = 1.0 / cell_size_m(point.level);
-    Vector5 row;
-    row << r * r * r * point.volume_m3, r * r * point.volume_m3, r * point.volume_m3, point.volume_m3, 1.0;
+    Terms row;
+    row << r * r * r * point.volume_m3, r * r * point.volume_m3, r * point.volume_m3, point.volume_m3, 1.0, r;
     return row / point.latency_s;
   };
-  Matrix5 normal = Matrix5::Zero();
-  Vector5 right = Vector5::Zero();
+  Normal normal = Normal::Zero();
+  Terms right = Terms::Zero();
   double count = 0.0;
   for (const LatencyPoint& point : points) {
     if (!(point.latency_s > 0.0)) continue;
-    const Vector5 row = row_of(point);
+    const Terms row = row_of(point);
     normal += row * row.transpose();
     right += row;
     count += 1.0;
@@ -51,9 +51,9 @@ Eq4 fit_eq4(std::span<const LatencyPoint> points) noexcept {
   double best_cost = 1e300;
   for (unsigned set = 1; set < (1U << kTerms); ++set) {
     // Scaled to unit diagonal: the features differ by ten orders of magnitude.
-    Matrix5 A = Matrix5::Identity();
-    Vector5 b = Vector5::Zero();
-    Vector5 unit = Vector5::Ones();
+    Normal A = Normal::Identity();
+    Terms b = Terms::Zero();
+    Terms unit = Terms::Ones();
     for (int i = 0; i < kTerms; ++i) unit[i] = normal(i, i) > 0.0 ? 1.0 / std::sqrt(normal(i, i)) : 1.0;
     for (int i = 0; i < kTerms; ++i) {
       if (((set >> static_cast<unsigned>(i)) & 1U) == 0) continue;
@@ -62,14 +62,14 @@ Eq4 fit_eq4(std::span<const LatencyPoint> points) noexcept {
         if (((set >> static_cast<unsigned>(k)) & 1U) != 0) A(i, k) = normal(i, k) * unit[i] * unit[k];
       }
     }
-    const Vector5 scaled = core::inverse<kTerms>(A).lazyProduct(b);
-    const Vector5 x = scaled.cwiseProduct(unit);
+    const Terms scaled = core::inverse<kTerms>(A).lazyProduct(b);
+    const Terms x = scaled.cwiseProduct(unit);
     if (!x.allFinite() || x.minCoeff() < 0.0) continue;
-    const Vector5 normal_x = normal.lazyProduct(x);
+    const Terms normal_x = normal.lazyProduct(x);
     const double cost = count - 2.0 * right.dot(x) + x.dot(normal_x);
     if (cost < best_cost) {
       best_cost = cost;
-      best = {{x[0], x[1], x[2], 1.0}, x[3], x[4]};
+      best = {{x[0], x[1], x[2], 1.0}, x[3], x[4], x[5]};
     }
   }
   return best;

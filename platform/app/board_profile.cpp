@@ -203,8 +203,8 @@ class Sweeper {
   std::array<double, core::kStageCount> units_{};
 };
 
-std::array<double, 6> numbers_of(const governor::Eq4& e) {
-  return {e.q[0], e.q[1], e.q[2], e.q[3], e.per_m3_s, e.constant_s};
+std::array<double, 7> numbers_of(const governor::Eq4& e) {
+  return {e.q[0], e.q[1], e.q[2], e.q[3], e.per_m3_s, e.constant_s, e.fixed_sm};
 }
 
 }  // namespace
@@ -233,7 +233,7 @@ std::string to_toml(const BoardProfile& board) {
                 [](char c) { return c == '"' || c == '\\' || static_cast<unsigned char>(c) < 0x20; });
   std::string text = fmt::format(
       "# What the stages of roborun cost on a machine; written by roborun calibrate.\n"
-      "# mean, p99: latency = (q0 / p^3 + q1 / p^2 + q2 / p) q3 v + q4 v + q5, in s, m and m3.\n"
+      "# mean, p99: latency = (q0 / p^3 + q1 / p^2 + q2 / p) q3 v + q4 v + q5 + q6 / p, in s, m and m3.\n"
       "[board]\nmachine = \"{}\"\nper_unit_s = [{:.6e}]\n",
       machine, fmt::join(board.per_unit_s, ", "));
   for (std::size_t i = 0; i < 3; ++i) {
@@ -277,9 +277,9 @@ BoardProfile board_from_toml(const std::string& path, const std::string& text) {
     const toml::table& stage = table(kStageName[i]);
     reader.allow_keys(stage, where, {"mean", "p99"});
     for (const bool mean : {true, false}) {
-      std::array<double, 6> x{};
+      std::array<double, 7> x{};
       read(stage, mean ? "mean" : "p99", where.c_str(), x);
-      (mean ? board.stage[i].mean : board.stage[i].p99) = {{x[0], x[1], x[2], x[3]}, x[4], x[5]};
+      (mean ? board.stage[i].mean : board.stage[i].p99) = {{x[0], x[1], x[2], x[3]}, x[4], x[5], x[6]};
     }
   }
   return board;

@@ -266,7 +266,7 @@ TEST(LatticeSolver, SolveDoesNotAllocate) {
 }
 
 TEST(FitEq4, RecoversItsOwnModelAndReportsErrors) {
-  const Eq4 truth{{3e-6, 2e-6, 1e-6, 1.0}, 5e-7, 0.05};
+  const Eq4 truth{{3e-6, 2e-6, 1e-6, 1.0}, 5e-7, 0.05, 0.01};
   const LatencyModel model = from_eq4(truth);
   std::vector<LatencyPoint> points;
   for (int level = 0; level < kPrecisionLevels; ++level) {

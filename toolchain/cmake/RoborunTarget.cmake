@@ -1,7 +1,7 @@
 # One place for the flags of our own targets.
 #
 # roborun_library(NAME [REAL_TIME] SOURCES... DEPENDS...)   a static library; REAL_TIME adds -fno-exceptions -fno-rtti
-# roborun_test(NAME SOURCES... DEPENDS...)                  a GoogleTest program, each TEST a ctest test
+# roborun_test(NAME [ALONE] SOURCES... DEPENDS...)          a GoogleTest program, each TEST a ctest test; ALONE: nothing else runs meanwhile
 #
 # Determinism: -ffp-contract=off (GCC fuses multiply-adds on AArch64 otherwise), -fsigned-char, no -march=native,
 # and Eigen without vectorisation, so that sums are added in the same order on every machine.
@@ -48,7 +48,7 @@ function(roborun_library name)
 endfunction()
 
 function(roborun_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT;LABEL" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "ALONE" "TIMEOUT;LABEL" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE roborun_flags ${ARG_DEPENDS} GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE ROBORUN_TEST_DATA="${CMAKE_SOURCE_DIR}/tests/data")
@@ -58,5 +58,6 @@ function(roborun_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 600)  # sanitizers on a busy machine included
   endif()
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABEL}")
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABEL}"
+    RUN_SERIAL ${ARG_ALONE})
 endfunction()

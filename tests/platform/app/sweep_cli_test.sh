@@ -75,13 +75,13 @@ cat >"$folder/board.toml" <<'BOARD'
 machine = "a board"
 per_unit_s = [1e-7, 0, 1e-7, 1e-7, 1e-7, 1e-7]
 [map]
-mean = [0, 0, 1e-6, 1, 1e-6, 0.01]
+mean = [0, 0, 1e-6, 1, 1e-6, 0.01, 0]
 p99 = [0, 0, 1e-6, 1, 2e-6, 0.02]
 [export]
-mean = [0, 0, 0, 1, 1e-7, 0.001]
+mean = [0, 0, 0, 1, 1e-7, 0.001, 0]
 p99 = [0, 0, 0, 1, 2e-7, 0.002]
 [planner]
-mean = [0, 0, 0, 1, 1e-6, 0.01]
+mean = [0, 0, 0, 1, 1e-6, 0.01, 0]
 p99 = [0, 0, 0, 1, 2e-6, 0.02]
 BOARD
 "$roborun" sweep --environments 1 --designs aware --settings "$folder/short.toml" --profile "paper,$folder/board.toml" \
