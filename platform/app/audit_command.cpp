@@ -84,12 +84,14 @@ int audit(const Options& options) {
                     "125, 160, 200, 250, "
                     "320 or 400",
                     options.rate_Hz));
+  RealTimeConfig config;
+  config.inject = injection_of(options.spin);
   const sitl::NamedEnvironment environment = sitl::environment(options.env);
   const sitl::World world = sitl::generate(environment.knobs, sitl::Mission::kPackageDelivery, options.seed);
+  // Last, after everything that may be refused: the first time this measures the machine.
   std::string note;
   const Profile profile = host(default_host_path(), 1.0, note);
   if (!note.empty()) fmt::print(stderr, "roborun: {}\n", note);
-  RealTimeConfig config;
   config.mission.costs = profile.costs;
   config.mission.model = profile.model;
   config.mission.seed = options.seed;
@@ -98,7 +100,6 @@ int audit(const Options& options) {
   config.best_effort = options.best_effort;
   config.load = options.load;
   config.trace = !options.trace.empty();
-  config.inject = injection_of(options.spin);
   const bool terminal = isatty(STDERR_FILENO) != 0;
   const report::AuditReport result = run_real_time(world, config, [&](double done_s) {
     if (terminal) fmt::print(stderr, "\raudit {:3.0f} of {:.0f} s   ", done_s, options.seconds);

@@ -76,13 +76,13 @@ machine = "a board"
 per_unit_s = [1e-7, 0, 1e-7, 1e-7, 1e-7, 1e-7]
 [map]
 mean = [0, 0, 1e-6, 1, 1e-6, 0.01, 0]
-p99 = [0, 0, 1e-6, 1, 2e-6, 0.02]
+p99 = [0, 0, 1e-6, 1, 2e-6, 0.02, 0]
 [export]
 mean = [0, 0, 0, 1, 1e-7, 0.001, 0]
-p99 = [0, 0, 0, 1, 2e-7, 0.002]
+p99 = [0, 0, 0, 1, 2e-7, 0.002, 0]
 [planner]
 mean = [0, 0, 0, 1, 1e-6, 0.01, 0]
-p99 = [0, 0, 0, 1, 2e-6, 0.02]
+p99 = [0, 0, 0, 1, 2e-6, 0.02, 0]
 BOARD
 "$roborun" sweep --environments 1 --designs aware --settings "$folder/short.toml" --profile "paper,$folder/board.toml" \
   --out "$folder/boards" --json >"$folder/json" 2>/dev/null
