@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <sstream>
 
 #include "platform/sitl/world/input_error.hpp"
@@ -33,6 +34,22 @@ sitl::Mission mission_of(const std::string& name) {
   if (name == "search_and_rescue") return sitl::Mission::kSearchAndRescue;
   throw InputError(
       fmt::format("--mission: unknown mission '{}': must be package_delivery or search_and_rescue", name));
+}
+
+std::optional<int> whole_number(const std::string& text, int low, int high) {
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size() || value < low || value > high)
+    return std::nullopt;
+  return value;
+}
+
+int jobs_of(const std::string& text) {
+  const auto jobs = whole_number(text, 1, 1024);
+  if (!jobs)
+    throw InputError(
+        fmt::format("--jobs: '{}' is out of range: must be a whole number from 1 to 1024", text));
+  return *jobs;
 }
 
 std::uint64_t seed_of(const char* option, const std::string& text) {

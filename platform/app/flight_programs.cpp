@@ -121,10 +121,7 @@ void FlightProgram::guard(MonotonicTime now) noexcept {
   conditions_ = monitor_.step(now, measures);
   const Action wanted = governor::arbitrate(conditions_, phase_);
   if (!config_.answers) return;
-  if (wanted != action_) {
-    begin(wanted, now);
-    (void)events_.push_back({now, wanted, conditions_, phase_});
-  }
+  if (wanted != action_) begin(wanted, now);
   phase_ = governor::phase_after(action_, phase_);
   if (action_ == Action::kReturn) come_home(now);
   if (action_ == Action::kLand) land(now);
@@ -136,13 +133,13 @@ void FlightProgram::begin(Action action, MonotonicTime now) noexcept {
   if (action == Action::kHold || action == Action::kLand) flight_.brake();
   if (action == Action::kTerminate) aircraft_.terminate();
   action_since_ = now;
+  (void)events_.push_back({now, action, conditions_, phase_});
 }
 
 void FlightProgram::come_home(MonotonicTime now) noexcept {
   const Vector3 away = flight_.reference().p_W - flight_.home_W();
   if (away.norm() > kHome_m || !flight_.standing(now)) return;
   begin(Action::kLand, now);
-  (void)events_.push_back({now, Action::kLand, conditions_, phase_});
   phase_ = Phase::kLand;
 }
 

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -12,9 +11,11 @@
 #include <numeric>
 #include <thread>
 
+#include "platform/app/arguments.hpp"
 #include "platform/app/progress_line.hpp"
 #include "platform/app/scenario_file.hpp"
 #include "platform/app/worker_processes.hpp"
+#include "platform/report/svg.hpp"
 #include "platform/report/trace_csv.hpp"
 #include "platform/sitl/world/input_error.hpp"
 
@@ -67,26 +68,6 @@ json verdict_of(const Scenario& scenario) {
           {"state_hash", report.result.state_hash}};
 }
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '<':
-        out += "&lt;";
-        break;
-      case '&':
-        out += "&amp;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
-  }
-  return out;
-}
-
 std::string junit_of(const std::vector<json>& verdicts) {
   const auto failed =
       std::count_if(verdicts.begin(), verdicts.end(), [](const json& v) { return !v["passed"]; });
@@ -97,15 +78,15 @@ std::string junit_of(const std::vector<json>& verdicts) {
       "failures=\"{}\" time=\"{:.3f}\">\n",
       verdicts.size(), failed, total_s);
   for (const json& v : verdicts) {
-    xml += fmt::format("  <testcase classname=\"scenario\" name=\"{}\" time=\"{:.3f}\"", escaped(v["name"]),
-                       v["mission_time_s"].get<double>());
+    xml += fmt::format("  <testcase classname=\"scenario\" name=\"{}\" time=\"{:.3f}\"",
+                       report::xml_escape(v["name"]), v["mission_time_s"].get<double>());
     if (v["passed"]) {
       xml += "/>\n";
       continue;
     }
     const auto complaints = v["complaints"].get<std::vector<std::string>>();
     xml += fmt::format(">\n    <failure message=\"{}\"/>\n  </testcase>\n",
-                       escaped(fmt::format("{}", fmt::join(complaints, "; "))));
+                       report::xml_escape(fmt::format("{}", fmt::join(complaints, "; "))));
   }
   return xml + "</testsuite>\n";
 }
@@ -119,12 +100,7 @@ void tell(const json& v) {
 }
 
 int run_scenarios(const Options& options) {
-  int jobs = 0;
-  const auto [end, error] =
-      std::from_chars(options.jobs.data(), options.jobs.data() + options.jobs.size(), jobs);
-  if (error != std::errc{} || end != options.jobs.data() + options.jobs.size() || jobs < 1 || jobs > 1024)
-    throw InputError(
-        fmt::format("--jobs: '{}' is out of range: must be a whole number from 1 to 1024", options.jobs));
+  const int jobs = jobs_of(options.jobs);
   if (const std::string why = report::cannot_write(options.junit); !why.empty()) throw InputError(why);
   // Every file is checked before the first one is flown.
   std::vector<Scenario> scenarios;

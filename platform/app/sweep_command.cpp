@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -39,14 +38,6 @@ struct Options {
   bool json{false};
   std::vector<std::string> merged;
 };
-
-std::optional<int> whole_number(const std::string& text, int low, int high) {
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || value < low || value > high)
-    return std::nullopt;
-  return value;
-}
 
 template <typename T>
 void refuse_twice(const char* option, const std::vector<T>& values) {
@@ -144,13 +135,10 @@ void tell(const SweepStore& store, const Options& options) {
 int sweep(const Options& options) {
   SweepInputs inputs;
   const SweepPlan plan = plan_of(options, inputs);
-  const auto jobs = whole_number(options.jobs, 1, 1024);
-  if (!jobs)
-    throw InputError(
-        fmt::format("--jobs: '{}' is out of range: must be a whole number from 1 to 1024", options.jobs));
+  const int jobs = jobs_of(options.jobs);
   try_sweep(plan, inputs);
   SweepStore store(options.out, plan);
-  const bool complete = fly_sweep(store, inputs, *jobs);
+  const bool complete = fly_sweep(store, inputs, jobs);
   tell(store, options);
   if (!complete)
     fmt::print(stderr, "roborun: stopped; what was flown is kept: the same command goes on from there\n");

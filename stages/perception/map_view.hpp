@@ -22,9 +22,7 @@ class MapView {
   /// The same of the whole map at its finest, whatever p1 and v1 of the view are: for what is already being
   /// flown, which a coarser view must not call blocked. A backend that knows nothing finer answers as
   /// is_free().
-  [[nodiscard]] virtual bool is_free_at_finest(const Aabb& box_W, std::uint64_t& lookups) const noexcept {
-    return is_free(box_W, lookups);
-  }
+  [[nodiscard]] virtual bool is_free_at_finest(const Aabb& box_W, std::uint64_t& lookups) const noexcept = 0;
   /// The state of the cell of the view that contains the point. Occupied wins over unknown, unknown over
   /// free.
   [[nodiscard]] virtual CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept = 0;
@@ -37,6 +35,9 @@ class FinestView final : public MapView {
  public:
   explicit FinestView(const MapView& view) noexcept : view_(view) {}
   [[nodiscard]] bool is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
+    return view_.is_free_at_finest(box_W, lookups);
+  }
+  [[nodiscard]] bool is_free_at_finest(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
     return view_.is_free_at_finest(box_W, lookups);
   }
   [[nodiscard]] CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept override {

@@ -34,16 +34,26 @@ std::uint64_t at_every_allocation(const Run& run) {
   return hit;
 }
 
-TEST(Exhaustion, OfMapBricksLosesSpaceButNeverMakesSurfacesFree) {
+test::Scene wall_on_a_floor() {
   test::Scene scene;
   scene.solid = {{Vector3(-12, -12, -1), Vector3(12, 12, 0)}, {Vector3(3, -1, 0), Vector3(4, 1, 6)}};
-  const Vector3 at(0.1, 0.2, 2.0);
-  const auto frames = scene.look(at, 32, 9.0F);
-  const std::array<Vector3, 1> here{at};
+  return scene;
+}
+
+BrickMap::Config small_map() {
   BrickMap::Config config;
   config.bounds_W = {Vector3(-12, -12, -3), Vector3(12, 12, 7)};
   config.max_bricks = 256;
   config.max_image_side = 32;
+  return config;
+}
+
+TEST(Exhaustion, OfMapBricksLosesSpaceButNeverMakesSurfacesFree) {
+  test::Scene scene = wall_on_a_floor();
+  const Vector3 at(0.1, 0.2, 2.0);
+  const auto frames = scene.look(at, 32, 9.0F);
+  const std::array<Vector3, 1> here{at};
+  const BrickMap::Config config = small_map();
   std::vector<std::byte> block(BrickMap::arena_bytes(config));
   core::UnlimitedBudget unlimited;
   double whole_m3 = 0.0;
@@ -143,15 +153,11 @@ TEST(Exhaustion, OfPlannerNodesStillGivesOnlyFreePaths) {
 /// The plan of a flight is that of these three: whatever hands out elements while it runs is refused them
 /// above, all other pools are tables that belong to it whole.
 TEST(Exhaustion, EveryPoolThatHandsOutElementsWasRefusedThem) {
-  test::Scene scene;
-  scene.solid = {{Vector3(-12, -12, -1), Vector3(12, 12, 0)}, {Vector3(3, -1, 0), Vector3(4, 1, 6)}};
+  test::Scene scene = wall_on_a_floor();
   const Vector3 at(0.1, 0.2, 2.0);
   const auto frames = scene.look(at, 16, 9.0F);
   const std::array<Vector3, 1> here{at};
-  BrickMap::Config config;
-  config.bounds_W = {Vector3(-12, -12, -3), Vector3(12, 12, 7)};
-  config.max_bricks = 256;
-  config.max_image_side = 32;
+  const BrickMap::Config config = small_map();
   std::vector<std::byte> block(BrickMap::arena_bytes(config) + PointCloud::arena_bytes({}) +
                                RrtStar::arena_bytes({}) + 4096);
   core::Arena arena(block);

@@ -25,6 +25,9 @@ class BoxView final : public stages::MapView {
     }
     return true;
   }
+  [[nodiscard]] bool is_free_at_finest(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
+    return is_free(box_W, lookups);
+  }
   [[nodiscard]] stages::CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept override {
     ++lookups;
     for (const Aabb& o : occupied) {

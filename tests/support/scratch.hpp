@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 #include <string>
 
 namespace roborun::test {
@@ -28,5 +29,12 @@ inline const std::filesystem::path& scratch_folder() {
 
 /// A file's path in it.
 inline std::string scratch(const std::string& name) { return (scratch_folder() / name).string(); }
+
+/// The same, with the file there.
+inline std::string scratch_file(const std::string& name, const std::string& bytes) {
+  const std::string path = scratch(name);
+  std::ofstream(path, std::ios::binary) << bytes;
+  return path;
+}
 
 }  // namespace roborun::test

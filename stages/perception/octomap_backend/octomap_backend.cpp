@@ -325,6 +325,10 @@ class OctomapBackend final : public OccupancyMap, private MapView {
     }
     return true;
   }
+  /// The window is copied at one precision.
+  [[nodiscard]] bool is_free_at_finest(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
+    return is_free(box_W, lookups);
+  }
   [[nodiscard]] bool is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
     std::array<std::int64_t, 3> a{};
     std::array<std::int64_t, 3> b{};

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <set>
 
@@ -12,17 +11,11 @@
 namespace roborun::app {
 namespace {
 
-std::string write(const std::string& name, const std::string& text) {
-  const std::string path = test::scratch(name);
-  std::ofstream(path, std::ios::binary) << text;
-  return path;
-}
-
 const std::string kHead = "[scenario]\nabout = \"x\"\nworld = \"w.toml\"\n";
 const std::string kTail = "[expect]\noutcome = \"landed\"\n";
 
 TEST(ScenarioFile, ReadsEveryTable) {
-  const Scenario s = load_scenario(write(
+  const Scenario s = load_scenario(test::scratch_file(
       "all.toml", kHead + "seed = 7\nanswers = false\n[camera]\npixels = 48\n[fog]\nvisibility_m = 9\n" +
                       "[fence]\naltitude_m = [1, 9]\nkeep_out = [{ circle = [5, 5, 2] }]\n" +
                       "[[fault]]\ncomponent = \"esc\"\nkind = \"off\"\ninstance = 3\nphase = \"return\"\n" +
@@ -84,7 +77,7 @@ TEST(ScenarioFile, RefusesWithFileLineKeyAndWhatWouldBeRight) {
   };
   for (const auto& [text, says] : cases) {
     try {
-      (void)load_scenario(write("bad.toml", text));
+      (void)load_scenario(test::scratch_file("bad.toml", text));
       ADD_FAILURE() << text;
     } catch (const sitl::InputError& error) {
       EXPECT_NE(std::string(error.what()).find(says), std::string::npos) << error.what();
@@ -94,9 +87,10 @@ TEST(ScenarioFile, RefusesWithFileLineKeyAndWhatWouldBeRight) {
 }
 
 TEST(ScenarioFile, RefusesAFenceThatStartOrGoalIsOutside) {
-  write("w.toml", "[world]\nbounds = [[-8, -8, 1], [30, 8, 8]]\nstart = [0, 0, 4]\ngoal = [20, 0, 4]\n");
-  const Scenario s =
-      load_scenario(write("outside.toml", kHead + "[fence]\nkeep_in = [{ circle = [0, 0, 10] }]\n" + kTail));
+  test::scratch_file("w.toml",
+                     "[world]\nbounds = [[-8, -8, 1], [30, 8, 8]]\nstart = [0, 0, 4]\ngoal = [20, 0, 4]\n");
+  const Scenario s = load_scenario(
+      test::scratch_file("outside.toml", kHead + "[fence]\nkeep_in = [{ circle = [0, 0, 10] }]\n" + kTail));
   EXPECT_THROW((void)fly_scenario(s), sitl::InputError);
 }
 

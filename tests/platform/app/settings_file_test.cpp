@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <fstream>
-
 #include "platform/app/board_profile.hpp"
 #include "platform/sitl/world/input_error.hpp"
 #include "tests/support/scratch.hpp"
@@ -11,17 +9,11 @@
 namespace roborun::app {
 namespace {
 
-std::string write(const std::string& name, const std::string& text) {
-  const std::string path = test::scratch(name);
-  std::ofstream(path, std::ios::binary) << text;
-  return path;
-}
-
 TEST(Settings, OverwritesWhatIsThereAndKeepsTheRest) {
   MissionConfig config;
-  load_settings(
-      write("settings.toml", "[camera]\npixels = 64\nrange_m = 18.5\n[wind]\nmean_mps = [4, 0, 0]\n"),
-      config);
+  load_settings(test::scratch_file("settings.toml",
+                                   "[camera]\npixels = 64\nrange_m = 18.5\n[wind]\nmean_mps = [4, 0, 0]\n"),
+                config);
   EXPECT_EQ(config.camera.pixels, 64);
   EXPECT_EQ(config.camera.range_m, 18.5);
   EXPECT_EQ(config.camera.rate_Hz, sitl::DepthCameraConfig{}.rate_Hz);
@@ -41,7 +33,7 @@ TEST(Settings, RefusesWithFileLineKeyAndRange) {
   for (const auto& [text, says] : cases) {
     MissionConfig config;
     try {
-      load_settings(write("bad.toml", text), config);
+      load_settings(test::scratch_file("bad.toml", text), config);
       ADD_FAILURE() << text;
     } catch (const sitl::InputError& error) {
       EXPECT_NE(std::string(error.what()).find(says), std::string::npos) << error.what();
@@ -52,7 +44,7 @@ TEST(Settings, RefusesWithFileLineKeyAndRange) {
 TEST(HostProfile, RefusesAMalformedFile) {
   std::string note;
   for (const char* text : {"", "x = 1\n", "[board]\nper_unit_s = [1, 2]\n", "\xff\xfe"}) {
-    EXPECT_THROW((void)host(write("bad_host.toml", text), 1.0, note), sitl::InputError) << text;
+    EXPECT_THROW((void)host(test::scratch_file("bad_host.toml", text), 1.0, note), sitl::InputError) << text;
   }
 }
 

@@ -15,9 +15,7 @@ namespace {
 class WorldFile : public testing::Test {
  protected:
   std::string write(const std::string& text, const std::string& name = "world.toml") {
-    const std::string path = test::scratch(name);
-    std::ofstream(path, std::ios::binary) << text;
-    return path;
+    return test::scratch_file(name, text);
   }
   /// What the reader says about a text; empty if it takes it.
   std::string complaint(const std::string& text) {
