@@ -18,36 +18,37 @@ LatencyModel from_eq4(const Eq4& eq4, double finest_m) noexcept {
   for (int level = 0; level < kPrecisionLevels; ++level) {
     const double r = 1.0 / (finest_m * static_cast<double>(1 << level));
     const auto i = static_cast<std::size_t>(level);
-    model.fixed_s[i] = std::max(eq4.constant_s + eq4.fixed_sm * r, 0.0);
-    model.slope_s_per_m3[i] =
-        std::max(((eq4.q[0] * r + eq4.q[1]) * r + eq4.q[2]) * r * eq4.q[3] + eq4.per_m3_s, 0.0);
+    model.slope_s_per_m3[i] = std::max(((eq4.q[0] * r + eq4.q[1]) * r + eq4.q[2]) * r * eq4.q[3], 0.0);
   }
   return model;
 }
 
 LatencyModel from_cost(const core::StageCost& cost) noexcept { return {cost.fixed_s, cost.per_m3_s}; }
 
-Eq4 fit_eq4(std::span<const LatencyPoint> points) noexcept {
-  constexpr int kTerms = 6;
+LatencyModel fit_latency(std::span<const LatencyPoint> points) noexcept {
+  constexpr int kVolumeTerms = 4;  // volume times r^3, r^2, r, 1
+  constexpr int kTerms = kVolumeTerms + kPrecisionLevels;
   using Terms = Eigen::Matrix<double, kTerms, 1>;
   using Normal = Eigen::Matrix<double, kTerms, kTerms>;
-  const auto row_of = [](const LatencyPoint& point) -> Terms {
-    const double r = 1.0 / cell_size_m(point.level);
-    Terms row;
-    row << r * r * r * point.volume_m3, r * r * point.volume_m3, r * point.volume_m3, point.volume_m3, 1.0, r;
-    return row / point.latency_s;
+  // Term 4 + k is a constant of levels 0 .. k: steps >= 0 make the constants fall with the level.
+  const auto terms_of = [](int level, double volume_m3) -> Terms {
+    const double r = 1.0 / cell_size_m(level);
+    Terms row = Terms::Zero();
+    row.head<kVolumeTerms>() << r * r * r * volume_m3, r * r * volume_m3, r * volume_m3, volume_m3;
+    for (int k = level; k < kPrecisionLevels; ++k) row[kVolumeTerms + k] = 1.0;
+    return row;
   };
   Normal normal = Normal::Zero();
   Terms right = Terms::Zero();
   double count = 0.0;
   for (const LatencyPoint& point : points) {
     if (!(point.latency_s > 0.0)) continue;
-    const Terms row = row_of(point);
+    const Terms row = terms_of(point.level, point.volume_m3) / point.latency_s;
     normal += row * row.transpose();
     right += row;
     count += 1.0;
   }
-  Eq4 best;
+  Terms best = Terms::Zero();
   double best_cost = 1e300;
   for (unsigned set = 1; set < (1U << kTerms); ++set) {
     // Scaled to unit diagonal: the features differ by ten orders of magnitude.
@@ -69,10 +70,17 @@ Eq4 fit_eq4(std::span<const LatencyPoint> points) noexcept {
     const double cost = count - 2.0 * right.dot(x) + x.dot(normal_x);
     if (cost < best_cost) {
       best_cost = cost;
-      best = {{x[0], x[1], x[2], 1.0}, x[3], x[4], x[5]};
+      best = x;
     }
   }
-  return best;
+  LatencyModel model;
+  for (int level = 0; level < kPrecisionLevels; ++level) {
+    const auto i = static_cast<std::size_t>(level);
+    const Terms terms = terms_of(level, 1.0);
+    model.slope_s_per_m3[i] = terms.head<kVolumeTerms>().dot(best.head<kVolumeTerms>());
+    model.fixed_s[i] = terms.tail<kPrecisionLevels>().dot(best.tail<kPrecisionLevels>());
+  }
+  return model;
 }
 
 ModelError error_of(const LatencyModel& model, std::span<const LatencyPoint> points) noexcept {

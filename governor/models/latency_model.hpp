@@ -1,4 +1,4 @@
-/// How long a stage takes at a precision and volume. Source: RoboRun Eq. 4, with a constant added.
+/// How long a stage takes at a precision and volume. Source: RoboRun Eq. 4, with a constant a level added.
 #pragma once
 
 #include <array>
@@ -18,14 +18,9 @@ struct LatencyModel {
   [[nodiscard]] double latency_s(int level, double volume_m3) const noexcept;
 };
 
-/// Eq. 4: (q0 / p^3 + q1 / p^2 + q2 / p) (q3 v), with three terms added that our own kernels need: a cost of
-/// volume that does not depend on precision, a constant, and a part of it that grows with 1 / p (a fine look
-/// at an image costs more than a coarse one before any space is written). Negative results are raised to 0.
+/// Eq. 4: (q0 / p^3 + q1 / p^2 + q2 / p) (q3 v). Negative results are raised to 0.
 struct Eq4 {
   std::array<double, 4> q{};
-  double per_m3_s{};
-  double constant_s{};
-  double fixed_sm{};  ///< Divided by p.
 };
 /// On the lattice finest_m * 2^level.
 [[nodiscard]] LatencyModel from_eq4(const Eq4& eq4, double finest_m = kFinestCell_m) noexcept;
@@ -42,10 +37,11 @@ struct ModelError {
   double mean_relative{};
   double max_relative{};
 };
-/// Least squares of the relative error with all coefficients >= 0 (so that the model is monotone), q3 = 1, by
-/// trying the 63 sets of active coefficients. Points with latency <= 0 are left out. Start-up only:
-/// O(points).
-[[nodiscard]] Eq4 fit_eq4(std::span<const LatencyPoint> points) noexcept;
+/// Eq. 4 with two terms added that our own kernels need: a cost of volume that does not depend on precision,
+/// and a constant a level, never larger for coarser cells. Least squares of the relative error with all
+/// coefficients >= 0 (so that the model is monotone), by trying every set of active ones. Points with
+/// latency <= 0 are left out. Start-up only: O(points).
+[[nodiscard]] LatencyModel fit_latency(std::span<const LatencyPoint> points) noexcept;
 /// Of a model on points, which are best not those it was fitted on. Start-up only.
 [[nodiscard]] ModelError error_of(const LatencyModel& model, std::span<const LatencyPoint> points) noexcept;
 

@@ -167,10 +167,10 @@ class Sweeper {
         }
       }
       StageModel& stage = board.stage[m];
-      stage.mean = governor::fit_eq4(points.mean);
-      stage.p99 = governor::fit_eq4(points.p99);
-      stage.mean_error = governor::error_of(governor::from_eq4(stage.mean), points.mean_hold_out);
-      stage.p99_error = governor::error_of(governor::from_eq4(stage.p99), points.p99_hold_out);
+      stage.mean = governor::fit_latency(points.mean);
+      stage.p99 = governor::fit_latency(points.p99);
+      stage.mean_error = governor::error_of(stage.mean, points.mean_hold_out);
+      stage.p99_error = governor::error_of(stage.p99, points.p99_hold_out);
     }
     return board;
   }
@@ -203,10 +203,6 @@ class Sweeper {
   std::array<double, core::kStageCount> units_{};
 };
 
-std::array<double, 7> numbers_of(const governor::Eq4& e) {
-  return {e.q[0], e.q[1], e.q[2], e.q[3], e.per_m3_s, e.constant_s, e.fixed_sm};
-}
-
 }  // namespace
 
 BoardProfile measure_board(int repeats, const std::function<void(double)>& progress, BoardSweep& sweep) {
@@ -233,13 +229,17 @@ std::string to_toml(const BoardProfile& board) {
                 [](char c) { return c == '"' || c == '\\' || static_cast<unsigned char>(c) < 0x20; });
   std::string text = fmt::format(
       "# What the stages of roborun cost on a machine; written by roborun calibrate.\n"
-      "# mean, p99: latency = (q0 / p^3 + q1 / p^2 + q2 / p) q3 v + q4 v + q5 + q6 / p, in s, m and m3.\n"
+      "# latency = fixed_s + s_per_m3 volume, a pair for each precision from 0.3 to 9.6 m: mean and 99th "
+      "percentile.\n"
       "[board]\nmachine = \"{}\"\nper_unit_s = [{:.6e}]\n",
       machine, fmt::join(board.per_unit_s, ", "));
   for (std::size_t i = 0; i < 3; ++i) {
     const StageModel& s = board.stage[i];
-    text += fmt::format("\n[{}]\nmean = [{:.6e}]\np99 = [{:.6e}]\n", kStageName[i],
-                        fmt::join(numbers_of(s.mean), ", "), fmt::join(numbers_of(s.p99), ", "));
+    text += fmt::format("\n[{}]\n", kStageName[i]);
+    for (const auto& [name, model] : {std::pair("mean", s.mean), std::pair("p99", s.p99)}) {
+      text += fmt::format("{0}_fixed_s = [{1:.6e}]\n{0}_s_per_m3 = [{2:.6e}]\n", name,
+                          fmt::join(model.fixed_s, ", "), fmt::join(model.slope_s_per_m3, ", "));
+    }
     text += fmt::format(
         "# on points not fitted: mean {:.1f} % (at most {:.1f} %), p99 {:.1f} % (at most {:.1f} %)\n",
         100.0 * s.mean_error.mean_relative, 100.0 * s.mean_error.max_relative,
@@ -275,12 +275,12 @@ BoardProfile board_from_toml(const std::string& path, const std::string& text) {
   for (std::size_t i = 0; i < 3; ++i) {
     const std::string where = fmt::format("[{}]", kStageName[i]);
     const toml::table& stage = table(kStageName[i]);
-    reader.allow_keys(stage, where, {"mean", "p99"});
-    for (const bool mean : {true, false}) {
-      std::array<double, 7> x{};
-      read(stage, mean ? "mean" : "p99", where.c_str(), x);
-      (mean ? board.stage[i].mean : board.stage[i].p99) = {{x[0], x[1], x[2], x[3]}, x[4], x[5], x[6]};
-    }
+    reader.allow_keys(stage, where, {"mean_fixed_s", "mean_s_per_m3", "p99_fixed_s", "p99_s_per_m3"});
+    StageModel& model = board.stage[i];
+    read(stage, "mean_fixed_s", where.c_str(), model.mean.fixed_s);
+    read(stage, "mean_s_per_m3", where.c_str(), model.mean.slope_s_per_m3);
+    read(stage, "p99_fixed_s", where.c_str(), model.p99.fixed_s);
+    read(stage, "p99_s_per_m3", where.c_str(), model.p99.slope_s_per_m3);
   }
   return board;
 }
@@ -290,7 +290,7 @@ Profile to_profile(const BoardProfile& board, double factor) {
   for (std::size_t i = 0; i < core::kStageCount; ++i)
     profile.costs.stage[i].per_unit_s = factor * board.per_unit_s[i];
   for (std::size_t i = 0; i < 3; ++i) {
-    profile.model[i] = governor::from_eq4(board.stage[i].p99);
+    profile.model[i] = board.stage[i].p99;
     for (double& s : profile.model[i].fixed_s) s *= factor;
     for (double& s : profile.model[i].slope_s_per_m3) s *= factor;
   }

@@ -19,8 +19,8 @@ struct Profile {
 
 /// One stage of a board: its models, and how far they are from points that they were not fitted on.
 struct StageModel {
-  governor::Eq4 mean{};
-  governor::Eq4 p99{};
+  governor::LatencyModel mean{};
+  governor::LatencyModel p99{};
   governor::ModelError mean_error{};
   governor::ModelError p99_error{};
 };

@@ -42,7 +42,7 @@ std::string plot_of(const BoardProfile& board, const BoardSweep& sweep) {
     for (std::size_t i = 0; i < 3; ++i) {
       const StageModel& stage = board.stage[i];
       const BoardSweep::Stage& points = sweep.stage[i];
-      const governor::LatencyModel model = governor::from_eq4(p99 ? stage.p99 : stage.mean);
+      const governor::LatencyModel& model = p99 ? stage.p99 : stage.mean;
       report::CalibrationPanel panel{
           fmt::format("{}, {}: {:.1f} % off", kTitle[i], p99 ? "p99" : "mean",
                       100.0 * (p99 ? stage.p99_error : stage.mean_error).mean_relative),

@@ -265,21 +265,36 @@ TEST(LatticeSolver, SolveDoesNotAllocate) {
   EXPECT_EQ(scope.count(), 0U);
 }
 
-TEST(FitEq4, RecoversItsOwnModelAndReportsErrors) {
-  const Eq4 truth{{3e-6, 2e-6, 1e-6, 1.0}, 5e-7, 0.05, 0.01};
-  const LatencyModel model = from_eq4(truth);
+TEST(FitLatency, RecoversEq4WithAStepInItsConstantsAndReportsErrors) {
+  LatencyModel truth = from_eq4({{3e-6, 2e-6, 1e-6, 1.0}});
+  truth.fixed_s = {0.05, 0.04, 0.04, 0.03, 0.01, 0.01};
   std::vector<LatencyPoint> points;
   for (int level = 0; level < kPrecisionLevels; ++level) {
-    for (double v = 1e3; v <= 5e4; v *= 2.0) points.push_back({level, v, model.latency_s(level, v)});
+    for (double v = 1e3; v <= 5e4; v *= 2.0) points.push_back({level, v, truth.latency_s(level, v)});
   }
-  EXPECT_LT(error_of(from_eq4(fit_eq4(points)), points).max_relative, 1e-6);
+  EXPECT_LT(error_of(fit_latency(points), points).max_relative, 1e-6);
   for (std::size_t i = 0; i < points.size(); ++i) points[i].latency_s *= i % 2 == 0 ? 1.05 : 0.95;
-  const Eq4 noisy = fit_eq4(points);
-  const ModelError error = error_of(from_eq4(noisy), points);
+  const LatencyModel noisy = fit_latency(points);
+  const ModelError error = error_of(noisy, points);
   EXPECT_LT(error.mean_relative, 0.08);
   EXPECT_GT(error.max_relative, 0.01);
-  for (const double q : noisy.q) EXPECT_GE(q, 0.0);
-  EXPECT_EQ(error_of(model, {}).mean_relative, 0.0);
+  EXPECT_EQ(error_of(truth, {}).mean_relative, 0.0);
+}
+
+TEST(FitLatency, IsNotNegativeAndNeverDearerForCoarserCellsWhateverIsMeasured) {
+  core::CounterRng rng(11);
+  for (int trial = 0; trial < 50; ++trial) {
+    std::vector<LatencyPoint> points;
+    for (int i = 0; i < 40; ++i)
+      points.push_back({i % kPrecisionLevels, rng.uniform(0.0, 5e4), rng.uniform(-0.1, 1.0)});
+    const LatencyModel model = fit_latency(points);
+    EXPECT_GE(model.fixed_s.back(), 0.0);
+    EXPECT_GE(model.slope_s_per_m3.back(), 0.0);
+    for (std::size_t i = 1; i < kPrecisionLevels; ++i) {
+      EXPECT_LE(model.fixed_s[i], model.fixed_s[i - 1]);
+      EXPECT_LE(model.slope_s_per_m3[i], model.slope_s_per_m3[i - 1]);
+    }
+  }
 }
 
 TEST(DriftScale, RisesAtOnceFallsSlowlyAndIsBounded) {

@@ -58,6 +58,9 @@ function(roborun_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 600)  # sanitizers on a busy machine included
   endif()
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABEL}"
-    RUN_SERIAL ${ARG_ALONE})
+  set(properties TIMEOUT ${ARG_TIMEOUT} RUN_SERIAL ${ARG_ALONE})
+  if(ARG_LABEL)  # an empty value would shift those behind it
+    list(APPEND properties LABELS ${ARG_LABEL})
+  endif()
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES ${properties})
 endfunction()

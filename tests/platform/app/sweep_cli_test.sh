@@ -75,14 +75,20 @@ cat >"$folder/board.toml" <<'BOARD'
 machine = "a board"
 per_unit_s = [1e-7, 0, 1e-7, 1e-7, 1e-7, 1e-7]
 [map]
-mean = [0, 0, 1e-6, 1, 1e-6, 0.01, 0]
-p99 = [0, 0, 1e-6, 1, 2e-6, 0.02, 0]
+mean_fixed_s = [0.01, 0.01, 0.01, 0.01, 0.01, 0.01]
+mean_s_per_m3 = [4.3e-6, 2.7e-6, 1.8e-6, 1.4e-6, 1.2e-6, 1.1e-6]
+p99_fixed_s = [0.02, 0.02, 0.02, 0.02, 0.02, 0.02]
+p99_s_per_m3 = [5.3e-6, 3.7e-6, 2.8e-6, 2.4e-6, 2.2e-6, 2.1e-6]
 [export]
-mean = [0, 0, 0, 1, 1e-7, 0.001, 0]
-p99 = [0, 0, 0, 1, 2e-7, 0.002, 0]
+mean_fixed_s = [0.001, 0.001, 0.001, 0.001, 0.001, 0.001]
+mean_s_per_m3 = [1e-7, 1e-7, 1e-7, 1e-7, 1e-7, 1e-7]
+p99_fixed_s = [0.002, 0.002, 0.002, 0.002, 0.002, 0.002]
+p99_s_per_m3 = [2e-7, 2e-7, 2e-7, 2e-7, 2e-7, 2e-7]
 [planner]
-mean = [0, 0, 0, 1, 1e-6, 0.01, 0]
-p99 = [0, 0, 0, 1, 2e-6, 0.02, 0]
+mean_fixed_s = [0.01, 0.01, 0.01, 0.01, 0.01, 0.01]
+mean_s_per_m3 = [1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6]
+p99_fixed_s = [0.02, 0.02, 0.02, 0.02, 0.02, 0.02]
+p99_s_per_m3 = [2e-6, 2e-6, 2e-6, 2e-6, 2e-6, 2e-6]
 BOARD
 "$roborun" sweep --environments 1 --designs aware --settings "$folder/short.toml" --profile "paper,$folder/board.toml" \
   --out "$folder/boards" --json >"$folder/json" 2>/dev/null
