@@ -133,6 +133,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
     request.radius_m = r_m + room_m;
     request.volume_m3 = std::max(point.v2_m3 - planner_work.volume_m3, 0.0);
     request.horizon_m = config_.horizon_m;
+    request.kept_W = kept_W_;
     request.seed = in.seed;
     stages::PlanResult planned;
     meter_.charge_to(core::StageId::kPlanner);
@@ -140,6 +141,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
     out.planned_to_goal = planned.reaches_goal;
     planner_work.units += planned.work.units;
     planner_work.volume_m3 += planned.work.volume_m3;
+    kept_W_ = planned.path_W;
     // Too tight for extra room is no reason to flee.
     if (room_m > 0.0 && out.planner_status == Status::kStartBlocked) continue;
     if (planned.path_W.size() >= 2) {

@@ -99,7 +99,8 @@ class DecisionPipeline {
   stages::OccupancyMap& map_;
   stages::Planner& planner_;
   stages::Smoother& smoother_;
-  int failures_{0};  ///< Decisions in a row without a trajectory.
+  stages::Path kept_W_;  ///< What was planned last.
+  int failures_{0};      ///< Decisions in a row without a trajectory.
 };
 
 }  // namespace roborun::app

@@ -15,6 +15,9 @@ namespace roborun::stages {
 /// A metre of space that nobody has seen yet counts as this many metres of known path: it may hide a detour.
 inline constexpr double kUnknownWeight = 2.0;
 
+inline constexpr std::size_t kMaxWaypoints = 64;
+using Path = core::StaticVector<Vector3, kMaxWaypoints>;
+
 struct PlanRequest {
   Vector3 start_W = Vector3::Zero();
   Vector3 goal_W =
@@ -24,15 +27,16 @@ struct PlanRequest {
   double volume_m3{};    ///< v2: stop when the explored volume exceeds it.
   double horizon_m{};    ///< No point of the path is farther from the start than this.
   double satisfied_m{};  ///< A path to the goal of at most this length ends the search; 0: search on.
+  /// The path of the plan before, or empty: a hint. Nothing of it is taken unchecked.
+  Path kept_W{};
   std::uint64_t seed{};  ///< Same request, same map, same seed: same path.
 };
 
 struct PlanResult {
-  static constexpr std::size_t kMaxWaypoints = 64;
-  core::StaticVector<Vector3, kMaxWaypoints> path_W{};  ///< From the start; empty unless kOk or kBudgetSpent.
-  bool reaches_goal{};                                  ///< The last way-point is the goal (within one cell).
-  double cost_m{};                                      ///< Length of the path.
-  core::Work work{};  ///< units: map lookups; volume_m3: space explored by the tree.
+  Path path_W{};        ///< From the start; empty unless kOk or kBudgetSpent.
+  bool reaches_goal{};  ///< The last way-point is the goal (within one cell).
+  double cost_m{};      ///< Length of the path.
+  core::Work work{};    ///< units: map lookups; volume_m3: space explored by the tree.
 };
 
 /// Contract (proved on every implementation by tests/stages/planning/planner_contract_test.cpp):

@@ -26,6 +26,22 @@ Vector3 towards_goal(const PlanRequest& request) noexcept {
                                          : Vector3(request.start_W + way * (request.horizon_m / distance_m));
 }
 
+using Samples = core::StaticVector<Vector3, 2 * kMaxWaypoints>;
+
+/// Points along a path inside the bounds, none farther than a step from the one before.
+Samples in_steps(const Path& path_W, double step_m, const Aabb& bounds_W) noexcept {
+  Samples points_W;
+  for (std::size_t i = 0; i + 1 < path_W.size(); ++i) {
+    const Vector3 way = path_W[i + 1] - path_W[i];
+    const int steps = std::max(static_cast<int>(std::fmin(std::ceil(way.norm() / step_m), 64.0)), 1);
+    for (int k = 1; k <= steps; ++k) {
+      const Vector3 p_W = path_W[i] + way * (static_cast<double>(k) / steps);
+      if (bounds_W.contains(p_W)) (void)points_W.push_back(p_W);
+    }
+  }
+  return points_W;
+}
+
 /// A fixed number of lookups.
 class Spare final : public core::StageBudget {
  public:
@@ -183,7 +199,7 @@ std::int32_t RrtStar::try_extend(Search& s, const Vector3& sample_W, double boun
 
 void RrtStar::extract(const PlanRequest& request, const MapView& view, std::int32_t node,
                       PlanResult& result) noexcept {
-  constexpr std::size_t kMost = PlanResult::kMaxWaypoints;
+  constexpr std::size_t kMost = kMaxWaypoints;
   std::array<Vector3, kMost> raw;
   std::size_t count = 0;
   for (std::int32_t i = node; i >= 0 && count < kMost; i = node_[static_cast<std::size_t>(i)].parent) {
@@ -306,12 +322,13 @@ Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32
   double best_m = promise_m(node(best), request.goal_W) + detour_m(request, view, node(best).p_W, work.units);
   double mark_m = best_m;
   std::uint32_t mark = 0;
+  const Samples kept_W = in_steps(request.kept_W, config_.step_m, request.bounds_W);
   for (std::uint32_t i = 0; i < config_.max_samples && !full(); ++i) {
     if (is_over(s)) {
       status = Status::kBudgetSpent;
       break;
     }
-    const Vector3 sample_W = sample(s);
+    const Vector3 sample_W = i < kept_W.size() ? kept_W[i] : sample(s);
     // Nothing that starts out longer than the best promise can become better than it.
     if ((sample_W - request.start_W).norm() > best_m) continue;
     const std::int32_t added = try_extend(s, sample_W, 1e300);

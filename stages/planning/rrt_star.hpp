@@ -15,8 +15,10 @@
 
 namespace roborun::stages {
 
-/// The tree grows from the start through known free space only. If the straight way to the goal (or to the
-/// horizon) is free, that is the answer. Otherwise there are two cases:
+/// The tree grows from the start through known free space only. Of the tree before, the branch that was
+/// taken is kept: its points are the first samples, and node, edge and parent of each are found anew in the
+/// newest map, so that a branch that is blocked now ends where it is blocked. If the straight way to the goal
+/// (or to the horizon) is free, that is the answer. Otherwise there are two cases:
 ///  - The goal lies in known free space within the horizon: straight on towards it wherever that is free and
 ///    sideways where it is not (the first solution), then RRT* with samples from the ellipsoid that can still
 ///    hold a shorter path; each better path is pulled tight and goes back into the tree.

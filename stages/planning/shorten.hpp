@@ -8,8 +8,6 @@
 
 namespace roborun::stages {
 
-using Path = core::StaticVector<Vector3, PlanResult::kMaxWaypoints>;
-
 [[nodiscard]] double length_m(const Path& path_W) noexcept;
 
 /// Shortens by `tries` straight ways between two random points of the path, each of them no longer than

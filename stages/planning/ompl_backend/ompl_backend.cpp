@@ -73,7 +73,7 @@ class OmplPlanner final : public Planner {
     const ob::PathPtr solution = problem->getSolutionPath();
     if (!solution) return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
     const auto& path = static_cast<const og::PathGeometric&>(*solution);
-    for (std::size_t i = 0; i < path.getStateCount() && i < PlanResult::kMaxWaypoints; ++i) {
+    for (std::size_t i = 0; i < path.getStateCount() && i < kMaxWaypoints; ++i) {
       const Vector3 p_W = to_vector(path.getState(static_cast<unsigned>(i)));
       if (!result.path_W.empty()) result.cost_m += (p_W - result.path_W.back()).norm();
       (void)result.path_W.push_back(p_W);

@@ -111,6 +111,19 @@ TEST_P(PlannerContract, NamesWhatIsWrong) {
   EXPECT_EQ(sut_->plan(r, cell, unlimited_, result_), Status::kNoPath) << "walled in";
 }
 
+TEST_P(PlannerContract, NothingOfAKeptPathIsTakenUnchecked) {
+  const test::BoxView view = pillar_world();
+  PlanRequest r = request_to(Vector3(150, 0, 5));
+  for (const Vector3& p : {Vector3(0, 0, 5), Vector3(22, 0, 5), Vector3(40, 0, 5), Vector3(22, 90, 5),
+                           Vector3(std::nan(""), 0, 5), Vector3(20, 0, 5)})
+    (void)r.kept_W.push_back(p);
+  for (r.seed = 1; r.seed <= 3; ++r.seed) {
+    (void)sut_->plan(r, view, unlimited_, result_);
+    expect_free(r, view);
+    for (const Vector3& p : result_.path_W) EXPECT_TRUE(view.free_W.contains(p));
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Planners, PlannerContract, ::testing::Values("own", "RRTstar"),
                          [](const auto& instance) { return std::string(instance.param); });
 
@@ -236,6 +249,30 @@ TEST_F(RrtStarTest, GoesAsNearAsItCanToAGoalThatIsWalledIn) {
   EXPECT_FALSE(result_.reaches_goal);
   EXPECT_GT(result_.path_W.back().x(), 30.0);
   EXPECT_LT(result_.path_W.back().x(), 50.0);
+}
+
+TEST_F(RrtStarTest, FindsWhatItFoundBeforeWithLessVolume) {
+  const test::BoxView view = pillar_world();
+  int past = 0, without = 0, with = 0;
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    PlanRequest r = request_to(Vector3(150, 0, 5));
+    r.seed = seed;
+    PlanResult before;
+    ASSERT_EQ(sut_.plan(r, view, unlimited_, before), Status::kOk);
+    if (before.path_W.back().x() < 12.0) continue;
+    ++past;
+    r.start_W = Vector3(2, 0, 5);
+    r.seed += 1000;
+    r.volume_m3 = 1500.0;
+    (void)sut_.plan(r, view, unlimited_, result_);
+    without += !result_.path_W.empty() && result_.path_W.back().x() > 12.0 ? 1 : 0;
+    r.kept_W = before.path_W;
+    (void)sut_.plan(r, view, unlimited_, result_);
+    with += !result_.path_W.empty() && result_.path_W.back().x() > 12.0 ? 1 : 0;
+  }
+  EXPECT_GE(past, 40);
+  EXPECT_GE(with, past - 1);
+  EXPECT_LT(without, past - 8) << "or the volume is no limit, and this test shows nothing";
 }
 
 TEST_F(RrtStarTest, StopsAtVolumeAndBudget) {
