@@ -145,7 +145,7 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   const int extra = std::max(situation.failures - policy.failures_until_finer + 1, 0);
   coarsest = std::max(coarsest - extra, 0);
   const bool near_goal = situation.distance_to_goal_m < policy.near_goal_m;
-  if (near_goal) coarsest = std::min(coarsest, 1);
+  if (near_goal || situation.surveying) coarsest = std::min(coarsest, 1);
   const double overhead = overhead_s();
   const double see_m3 = profile.sensor_volume_m3 > 0.0 ? profile.sensor_volume_m3 : 0.0;  // NaN: nothing
   const auto needed_s = [&](int level, double share) {
@@ -162,6 +162,7 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
           ? trajectory_budget({profile.outlook.data(), profile.outlook_count}, config_.stopping, limits)
           : time_budget(profile.closest_unknown_m, profile.speed_mps, config_.stopping, limits);
   d.source = has_outlook ? BudgetSource::kTrajectory : BudgetSource::kVisibility;
+  if (situation.surveying) d.time_budget = policy.longest_budget;
   double deadline_s = seconds(d.time_budget) / policy.decisions_per_budget;
   const double useful_s = std::max(seconds(policy.longest), needed_s(coarsest, 1.0));
   if (deadline_s >= useful_s) {

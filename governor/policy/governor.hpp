@@ -66,6 +66,7 @@ struct GovernorConfig {
 struct Situation {
   int failures{};  ///< Decisions in a row without a trajectory.
   double distance_to_goal_m{};
+  bool surveying{};  ///< The flight goes on to its hover whatever comes of this decision.
 };
 
 /// What was decided, and why.

@@ -72,7 +72,7 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
 }
 
 void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noexcept {
-  out.decision = governor_.decide(out.profile, {failures_, (in.goal_W - in.p_WB).norm()});
+  out.decision = governor_.decide(out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing});
   if (out.decision.predicted_s[index(core::StageId::kGovernor)] > 0.0)
     charge(core::StageId::kGovernor, {}, out);
 }
@@ -106,6 +106,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   const stages::MapView& view = config_.fence.empty() ? map_.view() : fenced;
   const OperatingPoint& point = out.decision.point;
   const MonotonicTime takes_over = in.now + point.deadline;
+  if (in.climbing && takes_over < in.committed->start_time + from_seconds(in.committed->duration_s())) return;
   const TrajectoryPoint start = in.committed->at(takes_over);
   const double r_m = radius_m();
 
@@ -168,7 +169,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   if (out.smoother_status == Status::kOk && !keeps) {
     out.kind = DecisionKind::kNew;
     out.trajectory = smoothed.trajectory;
-  } else if (committed_until_s < 1e300) {
+  } else if (committed_until_s < 1e300 && !in.climbing) {
     const MonotonicTime soonest = in.now + out.latency + config_.minor_frame;
     const TrajectoryPoint then = in.committed->at(soonest);
     Trajectory stop;
@@ -200,7 +201,7 @@ void DecisionPipeline::run(core::StageId id, const DecisionInput& in, DecisionOu
       plan(in, out);
       for (std::size_t i = 0; i < core::kStageCount; ++i)
         governor_.observe(static_cast<core::StageId>(i), out.decision.predicted_s[i], seconds(out.cost[i]));
-      failures_ = out.smoother_status == Status::kOk ? 0 : failures_ + 1;
+      failures_ = out.smoother_status == Status::kOk || in.climbing ? 0 : failures_ + 1;
       return;
     case core::StageId::kSmoother:
       return;

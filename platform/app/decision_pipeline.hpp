@@ -36,6 +36,7 @@ struct DecisionInput {
   MonotonicTime now{};  ///< Start of the decision.
   std::span<const stages::PosedDepthFrame> frames{};
   const Trajectory* committed{};  ///< What the flight lane flies now.
+  bool climbing{false};           ///< To the first hover: looks around as precisely as it can.
   Vector3 p_WB = Vector3::Zero();
   Vector3 v_WB = Vector3::Zero();
   Vector3 goal_W = Vector3::Zero();

@@ -58,6 +58,7 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
         report.committed = flight_.committed();
         report.committed_number = flight_.committed_number();
       }
+      report.flying = flight_.flying();
       report.airborne = flight_.airborne();
       report.action = action_;
       report.standing = flight_.standing(now);
@@ -199,7 +200,7 @@ void DecisionProgram::choose_site() noexcept {
 void DecisionProgram::judge() noexcept {
   const bool answer = out_.planner_status == Status::kNoPath || out_.planner_status == Status::kGoalBlocked;
   // On the way home even "no way" is a failure: nothing else will bring it down.
-  const bool fine = out_.kind == DecisionKind::kNew || report_.site_known ||
+  const bool fine = out_.kind == DecisionKind::kNew || report_.site_known || in_.climbing ||
                     (answer && mail_.report.read().action != Action::kReturn);
   report_.failures = fine ? 0 : report_.failures + 1;
   if (config_.map_refusals == nullptr) return;
@@ -211,7 +212,7 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
   (void)mail_.report.take();
   const FlightReport& report = mail_.report.read();
   const stages::EstimatedState& state = report.state;
-  if (given_up_.load(std::memory_order_acquire) || !report.airborne || !report.estimated) {
+  if (given_up_.load(std::memory_order_acquire) || !report.flying || !report.estimated) {
     // Nobody waits for it: decisions have not begun, or are over.
     last_usable_.fill(lane.release());
     publish(lane.release() + kIdlePeriod);
@@ -240,6 +241,7 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
   in_.now = lane.release();
   in_.frames = {frames_.begin(), frames_.size()};
   in_.committed = &flown(lane.release());
+  in_.climbing = !report.airborne;
   in_.p_WB = state.p_WB;
   in_.v_WB = state.v_WB;
   in_.goal_W = report.action == Action::kReturn ? report.home_W

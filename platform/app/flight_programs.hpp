@@ -30,6 +30,7 @@ struct FlightReport {
   stages::PastStates past{Nanos{0}};
   Trajectory committed{};
   std::uint64_t committed_number{0};
+  bool flying{false};
   bool airborne{false};
   governor::Action action{governor::Action::kGoOn};
   bool standing{false};
