@@ -159,7 +159,7 @@ void draw_path(Svg& svg, const MissionReport& mission, const Frame& f, const Qua
   };
   Vector3 last_W = Vector3::Constant(1e9);
   for (const PathPoint& p : mission.path) {
-    if ((p.p_WB - last_W).head<2>().norm() * f.scale < 1.0) continue;
+    if ((p.p_WB - last_W).head<2>().norm() * f.scale < 2.0) continue;
     const std::string here = fmt::format("{:.1f},{:.1f} ", f.x(p.p_WB.x()), f.y(p.p_WB.y()));
     const int next = colour_step(mission, p, quantity);
     if (next != step) {

@@ -73,7 +73,8 @@ TEST(BoardProfile, ChargesOtherLibrariesByVolumeAndTheOwnStagesByTheirWork) {
   for (const core::StageId id : {core::StageId::kMap, core::StageId::kExport, core::StageId::kPlanner}) {
     work.volume_m3 = 0.0;
     const Nanos none = stock.costs.cost(id, work);
-    EXPECT_GT(own.costs.cost(id, work), none);
+    EXPECT_GT(own.costs.cost(id, work), own.costs.cost(id, {}));
+    EXPECT_EQ(none, stock.costs.cost(id, {})) << "what it counts does not matter";
     work.volume_m3 = 1e4;
     EXPECT_GE(stock.costs.cost(id, work), none);
     EXPECT_EQ(stock.costs.of(id).per_unit_s, 0.0);
