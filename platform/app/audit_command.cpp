@@ -90,7 +90,7 @@ int audit(const Options& options) {
   const sitl::World world = sitl::generate(environment.knobs, sitl::Mission::kPackageDelivery, options.seed);
   // Last, after everything that may be refused: the first time this measures the machine.
   std::string note;
-  const Profile profile = host(default_host_path(), 1.0, note);
+  const Profile profile = host(default_host_path({}), {}, 1.0, note);
   if (!note.empty()) fmt::print(stderr, "roborun: {}\n", note);
   config.mission.costs = profile.costs;
   config.mission.model = profile.model;

@@ -12,6 +12,13 @@
 
 namespace roborun::app {
 
+/// Which map and planner: "own" or "octomap", "own" or "ompl:NAME".
+struct BackendNames {
+  std::string map{"own"};
+  std::string planner{"own"};
+  friend bool operator==(const BackendNames&, const BackendNames&) = default;
+};
+
 struct MapAndPlanner {
   std::unique_ptr<stages::OccupancyMap> map;
   std::unique_ptr<stages::Planner> planner;

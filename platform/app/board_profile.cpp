@@ -10,7 +10,7 @@
 #include <filesystem>
 
 #include "core/geometry/camera_pose.hpp"
-#include "platform/app/backends.hpp"
+#include "platform/app/shipped_boards.hpp"
 #include "platform/report/trace_csv.hpp"
 #include "platform/rt/host_identity.hpp"
 #include "platform/sitl/world/generator.hpp"
@@ -78,7 +78,9 @@ struct Samples {
 
 class Sweeper {
  public:
-  Sweeper() : world_(sitl::generate(sitl::environment("14").knobs, sitl::Mission::kPackageDelivery, 1)) {
+  explicit Sweeper(const BackendNames& backends)
+      : backends_(backends),
+        world_(sitl::generate(sitl::environment("14").knobs, sitl::Mission::kPackageDelivery, 1)) {
     const Vector3 way = world_.goal_W() - world_.start_W();
     for (int scene = 0; scene < kScenes; ++scene) {
       const Vector3 center_W = world_.start_W() + 0.5 * scene * way;
@@ -102,7 +104,8 @@ class Sweeper {
     const auto at = static_cast<std::size_t>(pose) + scene;  // a scene has a pose more than it has steps
     core::Arena arena(block_);
     stages::PointCloud cloud({}, arena);
-    const MapAndPlanner backends = make_backends("own", "own", bounds_W_[scene], {}, arena);
+    const MapAndPlanner backends =
+        make_backends(backends_.map, backends_.planner, bounds_W_[scene], {}, arena);
     core::UnlimitedBudget unlimited;
     core::Work work;
     const std::array<Vector3, 1> before{poses_W_[at]};
@@ -192,6 +195,7 @@ class Sweeper {
     add_units(kId[model], s, work);
   }
 
+  BackendNames backends_;
   sitl::World world_;
   std::vector<Aabb> bounds_W_;  ///< Of the map, a scene.
   std::vector<std::byte> block_;
@@ -205,8 +209,9 @@ class Sweeper {
 
 }  // namespace
 
-BoardProfile measure_board(int repeats, const std::function<void(double)>& progress, BoardSweep& sweep) {
-  Sweeper sweeper;
+BoardProfile measure_board(const BackendNames& backends, int repeats,
+                           const std::function<void(double)>& progress, BoardSweep& sweep) {
+  Sweeper sweeper(backends);
   for (int repeat = 0; repeat < repeats; ++repeat) {
     for (int pose = 0; pose < kPoses; ++pose) {
       for (int level = 0; level < kPrecisionLevels; ++level) {
@@ -220,6 +225,7 @@ BoardProfile measure_board(int repeats, const std::function<void(double)>& progr
   sweep = {};
   BoardProfile board = sweeper.result(sweep);
   board.machine = rt::identify_host().cpu;
+  board.backends = backends;
   return board;
 }
 
@@ -231,8 +237,9 @@ std::string to_toml(const BoardProfile& board) {
       "# What the stages of roborun cost on a machine; written by roborun calibrate.\n"
       "# latency = fixed_s + s_per_m3 volume, a pair for each precision from 0.3 to 9.6 m: mean and 99th "
       "percentile.\n"
-      "[board]\nmachine = \"{}\"\nper_unit_s = [{:.6e}]\n",
-      machine, fmt::join(board.per_unit_s, ", "));
+      "[board]\nmachine = \"{}\"\nmap = \"{}\"\nplanner = \"{}\"\nper_unit_s = [{:.6e}]\n",
+      machine, board.backends.map, board.backends.planner, fmt::join(board.per_unit_s, ", "));
+  if (board.factor < 1.0 || board.factor > 1.0) text += fmt::format("factor = {}\n", board.factor);
   for (std::size_t i = 0; i < 3; ++i) {
     const StageModel& s = board.stage[i];
     text += fmt::format("\n[{}]\n", kStageName[i]);
@@ -269,8 +276,13 @@ BoardProfile board_from_toml(const std::string& path, const std::string& text) {
   };
   BoardProfile board;
   const toml::table& head = table("board");
-  reader.allow_keys(head, "[board]", {"machine", "per_unit_s"});
+  reader.allow_keys(head, "[board]", {"machine", "map", "planner", "factor", "per_unit_s"});
   board.machine = head["machine"].value_or(std::string("unknown"));
+  board.backends.map = head["map"].value_or(board.backends.map);
+  board.backends.planner = head["planner"].value_or(board.backends.planner);
+  board.factor = reader.number_or(head, "factor", 1.0);
+  if (!(board.factor > 0.0 && board.factor <= 1000.0))
+    reader.refuse(*head.get("factor"), "factor", "must be above 0, at most 1000");
   read(head, "per_unit_s", "[board]", board.per_unit_s);
   for (std::size_t i = 0; i < 3; ++i) {
     const std::string where = fmt::format("[{}]", kStageName[i]);
@@ -286,16 +298,38 @@ BoardProfile board_from_toml(const std::string& path, const std::string& text) {
 }
 
 Profile to_profile(const BoardProfile& board, double factor) {
+  constexpr std::array<core::StageId, 3> kId{core::StageId::kMap, core::StageId::kExport,
+                                             core::StageId::kPlanner};
   Profile profile;
-  for (std::size_t i = 0; i < core::kStageCount; ++i)
-    profile.costs.stage[i].per_unit_s = factor * board.per_unit_s[i];
+  for (std::size_t i = 0; i < core::kStageCount; ++i) profile.costs.stage[i].per_unit_s = board.per_unit_s[i];
   for (std::size_t i = 0; i < 3; ++i) {
     profile.model[i] = board.stage[i].p99;
-    for (double& s : profile.model[i].fixed_s) s *= factor;
-    for (double& s : profile.model[i].slope_s_per_m3) s *= factor;
+    for (double& s : profile.model[i].fixed_s) s *= factor * board.factor;
+    for (double& s : profile.model[i].slope_s_per_m3) s *= factor * board.factor;
+    if ((kId[i] == core::StageId::kPlanner ? board.backends.planner : board.backends.map) == "own") continue;
+    const governor::LatencyModel& mean = board.stage[i].mean;
+    profile.costs.stage[static_cast<std::size_t>(kId[i])] = {mean.fixed_s, 0.0, mean.slope_s_per_m3};
   }
+  for (core::StageCost& cost : profile.costs.stage) cost = core::slower(cost, factor * board.factor);
   return profile;
 }
+
+namespace {
+
+Profile profile_for(const std::string& path, const std::string& text, const BackendNames& backends,
+                    double factor) {
+  const BoardProfile board = board_from_toml(path, text);
+  if (!(board.backends == backends)) {
+    throw sitl::InputError(
+        fmt::format("{}: has the costs of map {}, planner {}: must have those of map {}, planner {}: roborun "
+                    "calibrate --map {} --planner {} --out FILE",
+                    path, board.backends.map, board.backends.planner, backends.map, backends.planner,
+                    backends.map, backends.planner));
+  }
+  return to_profile(board, factor);
+}
+
+}  // namespace
 
 Profile paper() {
   Profile profile;
@@ -306,35 +340,43 @@ Profile paper() {
   return profile;
 }
 
-std::string default_host_path() {
+std::string default_host_path(const BackendNames& backends) {
+  std::string name = "host";
+  if (!(backends == BackendNames{})) name = fmt::format("host-{}-{}", backends.map, backends.planner);
+  std::replace(name.begin(), name.end(), ':', '_');
   if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache != '\0')
-    return fmt::format("{}/roborun/host.toml", cache);
+    return fmt::format("{}/roborun/{}.toml", cache, name);
   if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
-    return fmt::format("{}/.cache/roborun/host.toml", home);
-  return "roborun-host.toml";
+    return fmt::format("{}/.cache/roborun/{}.toml", home, name);
+  return fmt::format("roborun-{}.toml", name);
 }
 
-Profile host(const std::string& path, double factor, std::string& note) {
+Profile host(const std::string& path, const BackendNames& backends, double factor, std::string& note) {
   if (std::filesystem::exists(path))
-    return to_profile(board_from_toml(path, sitl::read_text(path, "a readable file")), factor);
+    return profile_for(path, sitl::read_text(path, "a readable file"), backends, factor);
   // Read back from its own text, so that the first run uses the same digits as all later ones.
   BoardSweep sweep;
-  const std::string text = to_toml(measure_board(2, {}, sweep));
+  const std::string text = to_toml(measure_board(backends, 2, {}, sweep));
   std::error_code ignored;
   std::filesystem::create_directories(std::filesystem::path(path).parent_path(), ignored);
   const std::string error = report::write_file(path, text);
   note = error.empty()
              ? fmt::format("measured this machine quickly, kept in {} (better: roborun calibrate)", path)
              : fmt::format("measured this machine for this run only: {}", error);
-  return to_profile(board_from_toml(path, text), factor);
+  return profile_for(path, text, backends, factor);
 }
 
-Profile load_profile(const std::string& name) {
+Profile load_profile(const std::string& name, const BackendNames& backends) {
   if (name == "paper") return paper();
   std::string note;
-  if (name == "host") return host(default_host_path(), 1.0, note);
-  const std::string text = sitl::read_text(name, "paper, host, or a file that roborun calibrate wrote");
-  return to_profile(board_from_toml(name, text), 1.0);
+  if (name == "host") return host(default_host_path(backends), backends, 1.0, note);
+  if (name == "cortex-a72") {
+    const bool own = backends == BackendNames{};
+    return profile_for(name, own ? kCortexA72 : kCortexA72Stock, backends, 1.0);
+  }
+  const std::string text =
+      sitl::read_text(name, "paper, host, cortex-a72, or a file that roborun calibrate wrote");
+  return profile_for(name, text, backends, 1.0);
 }
 
 }  // namespace roborun::app

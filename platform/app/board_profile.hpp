@@ -8,6 +8,7 @@
 
 #include "core/executive/cost_profile.hpp"
 #include "governor/models/latency_model.hpp"
+#include "platform/app/backends.hpp"
 
 namespace roborun::app {
 
@@ -26,7 +27,9 @@ struct StageModel {
 };
 
 struct BoardProfile {
-  std::string machine;                                 ///< What /proc/cpuinfo calls it.
+  std::string machine;      ///< What /proc/cpuinfo calls it.
+  BackendNames backends{};  ///< That were measured.
+  double factor{1.0};       ///< All times count this many times: an estimated board.
   std::array<double, core::kStageCount> per_unit_s{};  ///< Mean time of a unit of work.
   std::array<StageModel, 3> stage{};                   ///< Map, export, planner.
 };
@@ -40,28 +43,33 @@ struct BoardSweep {
 };
 
 /// Runs map, export and planner at 6 precisions x 8 volumes from 4 poses of environment 14, `repeats` times
-/// each (25 make 100 samples a point). Times are those of the thread: what other programs take is not
-/// counted, as a flight lane has its CPU to itself. Every third volume is held out. `progress` (may be empty)
-/// gets 0 .. 1.
-[[nodiscard]] BoardProfile measure_board(int repeats, const std::function<void(double)>& progress,
-                                         BoardSweep& sweep);
+/// each (25 make 100 samples a point), with `backends`. Times are those of the thread: what other programs
+/// take is not counted, as a flight lane has its CPU to itself. Every third volume is held out. `progress`
+/// (may be empty) gets 0 .. 1.
+[[nodiscard]] BoardProfile measure_board(const BackendNames& backends, int repeats,
+                                         const std::function<void(double)>& progress, BoardSweep& sweep);
 
 [[nodiscard]] std::string to_toml(const BoardProfile& board);
 /// Throws sitl::InputError with file, line and key.
 [[nodiscard]] BoardProfile board_from_toml(const std::string& path, const std::string& text);
 
-/// A machine `factor` times slower than the board.
+/// A machine `factor` times slower than the board. The own stages are charged by the work that they count;
+/// those of other libraries, which count rays and leaves of any size, by the mean model of their volume.
 [[nodiscard]] Profile to_profile(const BoardProfile& board, double factor);
 
 /// The authors' machine; the governor's model is the profile itself.
 [[nodiscard]] Profile paper();
-/// This machine, from `path`. A missing file is measured (a few seconds) and written, which `note` says,
-/// because a run must repeat; one that cannot be written is used for this run only. Throws sitl::InputError
-/// for a malformed file.
-[[nodiscard]] Profile host(const std::string& path, double factor, std::string& note);
-/// "paper", "host" (from its default path), or the path of a board file. Throws sitl::InputError.
-[[nodiscard]] Profile load_profile(const std::string& name);
-/// $XDG_CACHE_HOME/roborun/host.toml, or below $HOME/.cache, or in the working folder.
-[[nodiscard]] std::string default_host_path();
+/// This machine, from `path`. A missing file is measured (seconds, minutes for other libraries' stages) and
+/// written, which `note` says, because a run must repeat; one that cannot be written is used for this run
+/// only. Throws sitl::InputError for a malformed file, and for one of other backends.
+[[nodiscard]] Profile host(const std::string& path, const BackendNames& backends, double factor,
+                           std::string& note);
+/// "paper", "host" (from its default path), "cortex-a72" (shipped: an estimate), or the path of a board file.
+/// paper charges by volume, whatever computes; the others what `backends` cost. Throws sitl::InputError,
+/// also for a board that was measured with other backends.
+[[nodiscard]] Profile load_profile(const std::string& name, const BackendNames& backends);
+/// $XDG_CACHE_HOME/roborun/host.toml, or below $HOME/.cache, or in the working folder; for other backends
+/// than the own ones, host-MAP-PLANNER.toml.
+[[nodiscard]] std::string default_host_path(const BackendNames& backends);
 
 }  // namespace roborun::app

@@ -21,6 +21,7 @@ namespace {
 struct Options {
   std::string out;
   std::string plot;
+  BackendNames backends{};
   int repeats{25};
   bool stopping{false};
   bool json{false};
@@ -71,7 +72,7 @@ int calibrate_board(const Options& options) {
   {
     ProgressLine line;
     board = measure_board(
-        options.repeats,
+        options.backends, options.repeats,
         [&line](double done) {
           line.show(fmt::format("measuring map, export and planner: {:3.0f} %, {:.0f} s left", 100.0 * done,
                                 line.elapsed_s() * (1.0 - done) / done));
@@ -104,8 +105,12 @@ int calibrate_board(const Options& options) {
                100.0 * s.p99_error.mean_relative, 100.0 * s.p99_error.max_relative);
   }
   if (!options.plot.empty()) fmt::print("picture: {}\n", options.plot);
-  if (!options.out.empty())
-    fmt::print("board profile: {0}\nfly with it: roborun fly --profile {0}\n", options.out);
+  if (!options.out.empty()) {
+    fmt::print("board profile: {0}\nfly with it: roborun fly --profile {0}", options.out);
+    if (options.backends.map != "own") fmt::print(" --map {}", options.backends.map);
+    if (options.backends.planner != "own") fmt::print(" --planner {}", options.backends.planner);
+    fmt::print("\n");
+  }
   return 0;
 }
 
@@ -156,9 +161,13 @@ void add_calibrate_command(CLI::App& app, std::function<int()>& run) {
       "not seen.\n\n"
       "Examples:\n"
       "  roborun calibrate --out board.toml --plot board.svg    then: roborun fly --profile board.toml\n"
+      "  roborun calibrate --map octomap --planner ompl:RRTstar --out stock.toml    what the baseline costs\n"
       "  roborun calibrate --stopping                           braking distance of the simulated vehicle");
   command->add_option("--out", options->out, "Write the board profile to this TOML file");
   command->add_option("--plot", options->plot, "Draw points and models into this SVG file");
+  command->add_option("--map", options->backends.map, "own or octomap")->capture_default_str();
+  command->add_option("--planner", options->backends.planner, "own, or ompl:NAME such as ompl:RRTstar")
+      ->capture_default_str();
   command->add_option("--repeats", options->repeats, "Passes over the sweep; a point gets 4 samples in each")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();

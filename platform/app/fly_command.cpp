@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -68,10 +69,11 @@ Profile profile_of(const Options& options) {
     throw InputError(
         fmt::format("--host-factor: {} is out of range: must be above 0, at most 1000", options.host_factor));
   }
-  if (options.profile != "host") return load_profile(options.profile);
+  const BackendNames backends{options.map, options.planner};
+  if (options.profile != "host") return load_profile(options.profile, backends);
   std::string note;
-  const Profile profile =
-      host(options.host_file.empty() ? default_host_path() : options.host_file, options.host_factor, note);
+  const Profile profile = host(options.host_file.empty() ? default_host_path(backends) : options.host_file,
+                               backends, options.host_factor, note);
   if (!note.empty()) fmt::print(stderr, "roborun: {}\n", note);
   return profile;
 }
@@ -82,9 +84,12 @@ int fly(const Options& options) {
   for (const std::string& name : split(options.design)) designs.push_back(design_of("--design", name));
   const sitl::Mission mission = mission_of(options.mission);
   const std::uint64_t seed = seed_of("--seed", options.seed);
-  if (options.colour != "speed" && options.colour != "precision") {
-    throw InputError(fmt::format("--color: unknown colour '{}': must be speed or precision", options.colour));
-  }
+  const auto colour =
+      std::find(report::kPathColourName.begin(), report::kPathColourName.end(), options.colour);
+  const bool maps = options.colour == "all";
+  if (colour == report::kPathColourName.end() && !maps)
+    throw InputError(fmt::format("--color: unknown colour '{}': must be {} or all", options.colour,
+                                 fmt::join(report::kPathColourName, ", ")));
   if (!options.record.empty() && designs.size() != 1)
     throw InputError("--record: one flight a file: must go with one --design");
   for (const std::string& path : {options.trace, options.plot, options.record}) {
@@ -148,12 +153,14 @@ int fly(const Options& options) {
     for (const report::MissionResult& r : results)
       fmt::print("{:<12} state_hash {}, {:.0f} x real time\n", r.design, r.state_hash, r.real_time_factor);
   }
-  const auto colour = options.colour == "speed" ? report::PathColour::kSpeed : report::PathColour::kPrecision;
   std::string error;
   if (!options.trace.empty()) error = report::write_trace_csv(options.trace, reports);
-  if (error.empty() && !options.plot.empty())
-    error = report::write_file(options.plot,
-                               report::mission_svg(scene_of(*world, title, zone_m), reports, colour));
+  if (error.empty() && !options.plot.empty()) {
+    const report::Scene scene = scene_of(*world, title, zone_m);
+    const auto by = static_cast<report::PathColour>(colour - report::kPathColourName.begin());
+    error = report::write_file(
+        options.plot, maps ? report::maps_svg(scene, reports) : report::mission_svg(scene, reports, by));
+  }
   if (!error.empty()) throw InputError(error);
   if (!options.json && !options.plot.empty()) fmt::print("picture: {}\n", options.plot);
   if (!options.json && !options.trace.empty()) fmt::print("trace: {}\n", options.trace);
@@ -187,15 +194,15 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
       ->capture_default_str();
   fly_app
       ->add_option("--profile", options->profile,
-                   "What computing costs: paper (the authors' machine), host (this one), or a file of "
-                   "roborun calibrate")
+                   "What computing costs: paper (the authors' machine), host (this one), cortex-a72 (an "
+                   "estimate), or a file of roborun calibrate")
       ->capture_default_str();
   fly_app
       ->add_option("--host-factor", options->host_factor,
                    "With --profile host: a machine this many times slower")
       ->capture_default_str();
   fly_app->add_option("--host-file", options->host_file,
-                      "With --profile host: where the measured costs are kept [~/.cache/roborun/host.toml]");
+                      "With --profile host: where the measured costs are kept [~/.cache/roborun/]");
   fly_app->add_option("--seed", options->seed, "Seed of world, noise, wind and planner")
       ->capture_default_str();
   fly_app->add_option("--map", options->map, "own or octomap")->capture_default_str();
@@ -212,7 +219,11 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
                       "Write all inputs of the flight to this file, for roborun replay (0.3 MB a decision)");
   fly_app->add_option("--trace", options->trace, "Write every decision to this CSV file");
   fly_app->add_option("--plot", options->plot, "Write a picture of the mission to this SVG file");
-  fly_app->add_option("--color", options->colour, "Colour of the paths: speed or precision")
+  fly_app
+      ->add_option(
+          "--color", options->colour,
+          "What colours the paths of --plot: speed, precision, volume, latency, visibility, deadline; "
+          "all: a map of each")
       ->capture_default_str();
   fly_app->add_flag("--json", options->json, "One JSON object a design on standard output, nothing else");
   fly_app->callback([options, &run] { run = [options] { return fly(*options); }; });

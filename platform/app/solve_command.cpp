@@ -76,7 +76,7 @@ class Problem {
       refuse("q", "give either q (3 rows of 4 numbers) or profile (paper, or a board file)");
     if (json_.contains("profile")) {
       if (!json_["profile"].is_string()) refuse("profile", "must be paper or the path of a board file");
-      p.model = load_profile(json_["profile"].get<std::string>()).model;
+      p.model = load_profile(json_["profile"].get<std::string>(), {}).model;
       return p;
     }
     const Json& q = json_["q"];

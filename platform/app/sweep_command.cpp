@@ -13,6 +13,7 @@
 #include "platform/app/arguments.hpp"
 #include "platform/app/settings_file.hpp"
 #include "platform/app/sweep_run.hpp"
+#include "platform/report/evaluation_table.hpp"
 #include "platform/sitl/world/generator.hpp"
 #include "platform/sitl/world/input_error.hpp"
 #include "platform/sitl/world/text_file.hpp"
@@ -102,10 +103,9 @@ SweepPlan plan_of(const Options& options, SweepInputs& inputs) {
   }
   std::vector<std::string> names;
   for (const std::string& text : split(options.profiles)) {
-    const Profile profile = load_profile(text);
+    const Profile profile = load_profile(text, {plan.map, plan.planner});
     // Machines of a cluster keep the same file in different folders.
-    const std::string name =
-        text == "paper" || text == "host" ? text : std::filesystem::path(text).stem().string();
+    const std::string name = std::filesystem::path(text).stem().string();
     names.push_back(name);
     plan.profiles.push_back({name, profile_digest(profile)});
     inputs.profile[name] = profile;
@@ -152,6 +152,30 @@ int merge(const Options& options) {
   return store.complete() ? 0 : 1;
 }
 
+int compare(const Options& options) {
+  std::vector<report::SweepRow> rows;
+  for (const std::string& folder : options.merged) {
+    const SweepStore store(folder, plan_of_folder(folder));
+    for (report::SweepRow& row : rows_of(store)) rows.push_back(std::move(row));
+  }
+  fmt::print("{}", report::kernel_table(rows));
+  return 0;
+}
+
+void add_compare_command(CLI::App& sweep_app, const std::shared_ptr<Options>& options,
+                         std::function<int()>& run) {
+  CLI::App* compare_app = sweep_app.add_subcommand(
+      "compare", "Tell what awareness gains from what faster code gains: one table of several sweeps");
+  compare_app->footer(
+      "Example:\n"
+      "  roborun sweep --designs static-fair,aware --profile paper,cortex-a72,host --out out/own\n"
+      "  roborun sweep --designs static-fair,aware --profile paper,cortex-a72,host --map octomap \\\n"
+      "                --planner ompl:RRTstar --out out/stock\n"
+      "  roborun sweep compare out/stock out/own");
+  compare_app->add_option("folders", options->merged, "Folders of sweeps")->required();
+  compare_app->callback([options, &run] { run = [options] { return compare(*options); }; });
+}
+
 void add_merge_command(CLI::App& sweep_app, const std::shared_ptr<Options>& options,
                        std::function<int()>& run) {
   CLI::App* merge_app =
@@ -181,7 +205,9 @@ void add_sweep_command(CLI::App& app, std::function<int()>& run) {
       "  roborun sweep --seeds 1,2,3,4 --designs aware      collisions and intervals of one design\n"
       "  roborun sweep --environments 1,14,27 --profile paper,out/board.toml\n"
       "  roborun sweep --shard 2/4 --out out/shard-2        the second quarter, on another machine\n"
-      "  roborun sweep merge out/shard-* --out out/whole\n\n"
+      "  roborun sweep merge out/shard-* --out out/whole\n"
+      "  roborun sweep compare out/stock out/own            what awareness gains, and what faster code "
+      "gains\n\n"
       "The folder --out holds request.json, results.jsonl (one line a mission) and report.html (tables and\n"
       "pictures, opens offline). Stopped by Ctrl-C or power loss, the same command goes on. Results do not\n"
       "depend on --jobs, machine or order.\n"
@@ -196,7 +222,8 @@ void add_sweep_command(CLI::App& app, std::function<int()>& run) {
       ->capture_default_str();
   sweep_app
       ->add_option("--profile", options->profiles,
-                   "What computing costs: paper, host, files of roborun calibrate; several with commas")
+                   "What computing costs: paper (the authors' machine), host (this one), cortex-a72 (an "
+                   "estimate), or files of roborun calibrate; several with commas")
       ->capture_default_str();
   sweep_app->add_option("--seeds", options->seeds, "Whole numbers with commas")->capture_default_str();
   sweep_app->add_option("--map", options->map, "own or octomap")->capture_default_str();
@@ -212,6 +239,7 @@ void add_sweep_command(CLI::App& app, std::function<int()>& run) {
   sweep_app->add_option("--out", options->out, "Folder of the results")->capture_default_str();
   sweep_app->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
   add_merge_command(*sweep_app, options, run);
+  add_compare_command(*sweep_app, options, run);
   sweep_app->callback([options, &run, sweep_app] {
     if (sweep_app->get_subcommands().empty()) run = [options] { return sweep(*options); };
   });

@@ -40,8 +40,8 @@ struct SweepPlan {
 /// The missions of the plan's shard, in the order of the results file. Shards differ by at most one mission,
 /// and each gets its part of every design.
 [[nodiscard]] std::vector<SweepMission> missions_of(const SweepPlan& plan);
-/// The one mission a design that is drawn: environment 14 (or the middle one of the list), first profile,
-/// first seed.
+/// Missions of environment 14 (or the middle one of the list) in the first profile: their flights are kept.
+/// That of the first seed is drawn.
 [[nodiscard]] bool is_representative(const SweepPlan& plan, const SweepMission& mission);
 /// Unique within a plan; also what a person reads.
 [[nodiscard]] std::string name_of(const SweepMission& mission);

@@ -4,6 +4,7 @@
 #include "platform/app/arguments.hpp"
 #include "platform/app/scene.hpp"
 #include "platform/app/sweep_run.hpp"
+#include "platform/report/evaluation_table.hpp"
 #include "platform/report/flight_record.hpp"
 #include "platform/report/svg.hpp"
 #include "platform/report/sweep_plot.hpp"
@@ -19,21 +20,29 @@ constexpr const char* kStyle =
     "1em}"
     "pre{background:#f7f9fb;padding:1em;overflow-x:auto}svg{max-width:100%;height:auto}";
 
-/// The flights that are drawn, one a design that has any.
-std::vector<report::MissionReport> drawn_flights(const SweepStore& store) {
+/// The flights of the representative environment.
+std::vector<report::MissionReport> kept_flights(const SweepStore& store) {
   std::vector<report::MissionReport> flights;
   for (report::MissionResult& result : store.results()) {
-    if (!is_representative(store.plan(), mission_of_result(result))) continue;
+    const SweepMission mission = mission_of_result(result);
+    if (!is_representative(store.plan(), mission)) continue;
     report::MissionReport flight;
     flight.result = std::move(result);
-    if (!report::from_flight_record(store.flight(flight.result.design), flight)) {
+    if (!report::from_flight_record(store.flight(mission), flight)) {
       throw sitl::InputError(
-          fmt::format("{}/flight_{}.json: is not the record of a flight: remove it, and sweep again",
-                      store.folder(), flight.result.design));
+          fmt::format("{}/flight_{}_{}.json: is not the record of a flight: remove it, and sweep again",
+                      store.folder(), mission.design, mission.seed));
     }
     flights.push_back(std::move(flight));
   }
   return flights;
+}
+
+/// Text of several lines for <pre>.
+std::string escaped_lines(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) escaped += c == '\n' ? std::string("\n") : report::xml_escape(std::string(1, c));
+  return escaped;
 }
 
 class Page {
@@ -45,15 +54,20 @@ class Page {
         "</head><body>\n<h1>{0}</h1>\n",
         report::xml_escape(title), kStyle);
   }
+  /// A table on the page and in tables.txt.
   void text(const std::string& heading, const std::string& what) {
-    html_ += fmt::format("<h2>{}</h2>\n<pre>{}</pre>\n", heading, what);
+    html_ += fmt::format("<h2>{}</h2>\n<pre>{}</pre>\n", report::xml_escape(heading), escaped_lines(what));
+    tables_ += fmt::format("{}{}\n\n{}", tables_.empty() ? "" : "\n\n", heading, what);
   }
   /// A picture on the page and in a file of its own.
   void picture(const std::string& heading, const std::string& file, const std::string& svg) {
     html_ += fmt::format("<h2>{}</h2>\n{}", heading, svg);
     write(file, svg);
   }
-  void finish() { write("report.html", html_ + "</body></html>\n"); }
+  void finish() {
+    write("report.html", html_ + "</body></html>\n");
+    write("tables.txt", tables_);
+  }
 
  private:
   void write(const std::string& name, const std::string& text) {
@@ -62,14 +76,8 @@ class Page {
   }
   const SweepStore& store_;
   std::string html_;
+  std::string tables_;
 };
-
-/// Text of several lines for <pre>.
-std::string escaped_lines(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) escaped += c == '\n' ? std::string("\n") : report::xml_escape(std::string(1, c));
-  return escaped;
-}
 
 }  // namespace
 
@@ -80,19 +88,25 @@ void write_sweep_report(const SweepStore& store) {
   for (const SweepPlan::ProfileId& id : plan.profiles) profiles.push_back(id.name);
   Page page(store, fmt::format("roborun sweep {}: {} environments, seeds {}", plan.suite,
                                plan.environments.size(), fmt::join(plan.seeds, ", ")));
-  page.text("Overall", escaped_lines(fmt::format(
-                           "{}\nmission {}, map {}, planner {}, settings {}, build {}; {} of {} missions\n",
-                           report::sweep_table(rows), plan.mission, plan.map, plan.planner,
-                           plan.settings.empty() ? "default" : plan.settings, plan.build, rows.size(),
-                           store.missions().size())));
+  page.text("Overall",
+            fmt::format("{}\nmission {}, map {}, planner {}, settings {}, build {}; {} of {} missions\n",
+                        report::sweep_table(rows), plan.mission, plan.map, plan.planner,
+                        plan.settings.empty() ? "default" : plan.settings, plan.build, rows.size(),
+                        store.missions().size()));
   page.picture("Overall metrics", "overall.svg", report::overall_svg(rows));
   for (const std::string& profile : profiles) {
     page.picture(
         fmt::format("Sensitivity to the environment, profile {}", report::xml_escape(profile)),
         profiles.size() == 1 ? std::string("sensitivity.svg") : fmt::format("sensitivity_{}.svg", profile),
         report::sensitivity_svg(rows, profile));
+    page.text(fmt::format("Mission time over density, spread and distance, profile {}", profile),
+              report::sensitivity_table(rows, profile));
   }
-  const std::vector<report::MissionReport> flights = drawn_flights(store);
+  const std::vector<report::MissionReport> kept = kept_flights(store);
+  std::vector<report::MissionReport> flights;
+  for (const report::MissionReport& flight : kept) {
+    if (flight.result.seed == plan.seeds.front()) flights.push_back(flight);
+  }
   if (!flights.empty()) {
     const report::MissionResult& first = flights.front().result;
     const sitl::NamedEnvironment named = sitl::environment(first.env);
@@ -106,6 +120,8 @@ void write_sweep_report(const SweepStore& store) {
                  report::mission_svg(scene, flights, report::PathColour::kPrecision));
     page.picture("The same over time: where the latency goes", "representative_time.svg",
                  report::breakdown_svg(flights, scene.zone_borders_m));
+    page.text(fmt::format("Environment {} ({}), all seeds", named.number, named.name),
+              report::representative_table(kept, scene.zone_borders_m));
   }
   page.finish();
 }

@@ -29,8 +29,8 @@ void try_sweep(const SweepPlan& plan, const SweepInputs& inputs);
 
 [[nodiscard]] std::vector<report::SweepRow> rows_of(const SweepStore& store);
 
-/// Writes the pictures and report.html into the store's folder: the same lines give the same bytes. Throws
-/// sitl::InputError if a file cannot be written.
+/// Writes the pictures, report.html and tables.txt into the store's folder: the same lines give the same
+/// bytes. Throws sitl::InputError if a file cannot be written.
 void write_sweep_report(const SweepStore& store);
 
 }  // namespace roborun::app

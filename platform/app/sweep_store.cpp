@@ -23,7 +23,7 @@ using sitl::InputError;
 constexpr const char* kRequest = "request.json";
 constexpr const char* kResults = "results.jsonl";
 
-std::string flight_name(const std::string& design) { return fmt::format("flight_{}.json", design); }
+std::string flight_name(const SweepMission& m) { return fmt::format("flight_{}_{}.json", m.design, m.seed); }
 
 std::optional<std::string> read_file(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -121,7 +121,7 @@ void SweepStore::take_lines(const std::string& text) {
           fmt::format("{}:{}: is not a result of this sweep: remove the line", path(kResults), number));
     }
     const SweepMission& mission = missions_[found->second];
-    if (is_representative(plan_, mission) && !std::filesystem::exists(path(flight_name(mission.design))))
+    if (is_representative(plan_, mission) && !std::filesystem::exists(path(flight_name(mission))))
       continue;  // somebody removed its flight: fly it again
     if (!lines_.emplace(found->second, line).second) continue;
     kept += line + '\n';
@@ -130,7 +130,7 @@ void SweepStore::take_lines(const std::string& text) {
 }
 
 void SweepStore::add(std::size_t mission, const std::string& line, const std::string& flight) {
-  if (!flight.empty()) write_durably(folder_, flight_name(missions_[mission].design), flight);
+  if (!flight.empty()) write_durably(folder_, flight_name(missions_[mission]), flight);
   write_all(file_, line + '\n', path(kResults));
   lines_[mission] = line;
 }
@@ -151,8 +151,8 @@ std::vector<report::MissionResult> SweepStore::results() const {
   return results;
 }
 
-std::string SweepStore::flight(const std::string& design) const {
-  return read_file(path(flight_name(design))).value_or("");
+std::string SweepStore::flight(const SweepMission& mission) const {
+  return read_file(path(flight_name(mission))).value_or("");
 }
 
 void merge_shards(const std::vector<std::string>& folders, const std::string& out) {
@@ -183,7 +183,7 @@ void merge_shards(const std::vector<std::string>& folders, const std::string& ou
         throw InputError(
             fmt::format("{}: two shards have different results for {}", folder, name_of(mission)));
       if (!fresh || merged.has(i)) continue;
-      merged.add(i, line, is_representative(whole, mission) ? shard.flight(mission.design) : std::string{});
+      merged.add(i, line, is_representative(whole, mission) ? shard.flight(mission) : std::string{});
     }
   }
   merged.sort();

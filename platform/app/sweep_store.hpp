@@ -1,6 +1,6 @@
-/// The folder of a sweep: request.json (the plan), results.jsonl (one line a mission), flight_DESIGN.json
-/// (the missions that are drawn). What was written survives Ctrl-C and power loss; a half line at the end
-/// does not count.
+/// The folder of a sweep: request.json (the plan), results.jsonl (one line a mission),
+/// flight_DESIGN_SEED.json (of the representative environment). What was written survives Ctrl-C and power
+/// loss; a half line at the end does not count.
 #pragma once
 
 #include <map>
@@ -36,7 +36,7 @@ class SweepStore {
   /// In the order of the plan.
   [[nodiscard]] std::vector<report::MissionResult> results() const;
   /// Empty if there is none.
-  [[nodiscard]] std::string flight(const std::string& design) const;
+  [[nodiscard]] std::string flight(const SweepMission& mission) const;
 
  private:
   void take_lines(const std::string& text);

@@ -87,25 +87,68 @@ void draw_world(Svg& svg, const Scene& scene, const Frame& f, double height) {
   }
 }
 
-double precision_at(const MissionReport& mission, double time_s) {
-  double p0_m = 0.0;
-  for (const DecisionRecord& d : mission.decisions) {
-    if (d.time_s > time_s) break;
-    p0_m = d.p0_m;
+/// What a path can be coloured by, and the scale of the colours.
+struct Quantity {
+  std::string label;
+  bool logarithmic;
+  double low, high;
+  int parts;  ///< Of the legend.
+  double (*value)(const DecisionRecord&);
+
+  [[nodiscard]] double ratio(double x) const {
+    const double r =
+        logarithmic ? std::log(std::max(x, low) / low) / std::log(high / low) : (x - low) / (high - low);
+    return std::clamp(r, 0.0, 1.0);
   }
-  return p0_m;
+  [[nodiscard]] double at(double r) const {
+    return logarithmic ? low * std::pow(high / low, r) : low + r * (high - low);
+  }
+};
+
+Quantity quantity(PathColour colour, std::span<const MissionReport> missions) {
+  const auto most = [missions](double least, double (*value)(const DecisionRecord&)) {
+    double high = least;
+    for (const MissionReport& m : missions) {
+      for (const DecisionRecord& d : m.decisions)
+        high = std::isfinite(value(d)) ? std::max(high, value(d)) : high;
+    }
+    return high;
+  };
+  const auto volume = [](const DecisionRecord& d) { return 1e-3 * d.v0_m3; };
+  const auto latency = [](const DecisionRecord& d) { return d.latency_s; };
+  const auto visible = [](const DecisionRecord& d) { return d.visible_m; };
+  const auto deadline = [](const DecisionRecord& d) { return d.deadline_s; };
+  double top_mps = 1.0;
+  for (const MissionReport& m : missions) top_mps = std::max(top_mps, std::ceil(m.result.max_velocity_mps));
+  switch (colour) {
+    case PathColour::kSpeed:
+      break;
+    case PathColour::kPrecision:
+      return {"precision p0, m", true, 0.3, 9.6, 5, [](const DecisionRecord& d) { return d.p0_m; }};
+    case PathColour::kVolume:
+      return {"map volume, 1000 m3", false, 0.0, std::ceil(most(1.0, volume)), 4, volume};
+    case PathColour::kLatency:
+      return {"latency, s", true, 0.1, most(1.0, latency), 4, latency};
+    case PathColour::kVisibility:
+      return {"visibility, m", false, 0.0, std::ceil(most(1.0, visible)), 4, visible};
+    case PathColour::kDeadline:
+      return {"deadline, s", true, 0.1, most(1.0, deadline), 4, deadline};
+  }
+  return {"speed, m/s", false, 0.0, top_mps, 4, nullptr};
 }
 
-/// 0 .. 1 in 24 steps, so that neighbouring points share a colour and a polyline.
-int colour_step(const MissionReport& mission, const PathPoint& point, PathColour colour, double top_mps) {
-  if (colour == PathColour::kSpeed)
-    return static_cast<int>(std::lround(24.0 * std::clamp(point.speed_mps / top_mps, 0.0, 1.0)));
-  const double p0_m = precision_at(mission, point.time_s);
-  if (p0_m <= 0.0) return 0;
-  return static_cast<int>(std::lround(24.0 * std::clamp(std::log2(p0_m / 0.3) / 5.0, 0.0, 1.0)));
+/// 0 .. 1 in 24 steps, so that neighbouring points share a colour and a polyline. Speed is that of the path,
+/// everything else that of the decision before.
+int colour_step(const MissionReport& mission, const PathPoint& point, const Quantity& q) {
+  double value = q.value == nullptr ? point.speed_mps : 0.0;
+  for (const DecisionRecord& d : mission.decisions) {
+    if (q.value == nullptr || d.time_s > point.time_s) break;
+    value = q.value(d);
+  }
+  return static_cast<int>(std::lround(24.0 * q.ratio(std::isfinite(value) ? value : q.high)));
 }
 
-void draw_path(Svg& svg, const MissionReport& mission, const Frame& f, PathColour colour, double top_mps) {
+void draw_path(Svg& svg, const MissionReport& mission, const Frame& f, const Quantity& quantity) {
   std::string points;
   int step = -1;
   const auto flush = [&] {
@@ -116,9 +159,9 @@ void draw_path(Svg& svg, const MissionReport& mission, const Frame& f, PathColou
   };
   Vector3 last_W = Vector3::Constant(1e9);
   for (const PathPoint& p : mission.path) {
-    if ((p.p_WB - last_W).head<2>().norm() * f.scale < 1.0) continue;
+    if ((p.p_WB - last_W).head<2>().norm() * f.scale < 2.0) continue;
     const std::string here = fmt::format("{:.1f},{:.1f} ", f.x(p.p_WB.x()), f.y(p.p_WB.y()));
-    const int next = colour_step(mission, p, colour, top_mps);
+    const int next = colour_step(mission, p, quantity);
     if (next != step) {
       points += here;  // the segments meet
       flush();
@@ -174,21 +217,30 @@ void draw_chart(Svg& svg, std::span<const MissionReport> missions, const Series&
   }
 }
 
-void draw_legend(Svg& svg, PathColour colour, double top_mps, double right, double y) {
+void draw_legend(Svg& svg, const Quantity& q, double right, double y) {
   const double width = 240.0;
   const double left = right - width;
   for (int i = 0; i <= 24; ++i) {
     svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="10" fill="{}"/>)", left + i * width / 25.0,
             y, width / 25.0 + 0.5, ramp_colour(i / 24.0));
   }
-  const bool speed = colour == PathColour::kSpeed;
-  svg.text(left - 8, y + 10, speed ? "path: speed, m/s" : "path: precision p0, m", "end", 12, kInk);
-  for (int i = 0; i <= (speed ? 4 : 5); ++i) {
-    const double ratio = speed ? i / 4.0 : i / 5.0;
-    svg.text(left + ratio * width, y + 23,
-             speed ? fmt::format("{:.3g}", ratio * top_mps) : fmt::format("{:g}", 0.3 * (1 << i)), "middle",
-             11, kSoft);
+  svg.text(left - 8, y + 10, "path: " + q.label, "end", 12, kInk);
+  for (int i = 0; i <= q.parts; ++i) {
+    const double ratio = static_cast<double>(i) / q.parts;
+    svg.text(left + ratio * width, y + 23, fmt::format("{:.3g}", q.at(ratio)), "middle", 11, kSoft);
   }
+}
+
+void draw_ends(Svg& svg, const Scene& scene, const Frame& f) {
+  svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="6" fill="#ffffff" stroke="{}" stroke-width="2.5"/>)",
+          f.x(scene.start_W.x()), f.y(scene.start_W.y()), kInk);
+  svg.add(
+      R"(<path d="M {0:.1f} {1:.1f} l 0 -18 l 13 5 l -13 5" fill="#e12d39" stroke="{2}" stroke-width="1.5"/>)",
+      f.x(scene.goal_W.x()), f.y(scene.goal_W.y()), kInk);
+}
+
+const char* outcome(const MissionResult& r) {
+  return r.reason == "reached_goal" ? "reached the goal" : r.reason.c_str();
 }
 
 }  // namespace
@@ -203,7 +255,8 @@ std::string mission_svg(const Scene& scene, std::span<const MissionReport> missi
   for (const MissionReport& m : missions) top_mps = std::max(top_mps, std::ceil(m.result.max_velocity_mps));
 
   svg.text(kLeft, 34, scene.title, "start", 18, kInk, "bold");
-  draw_legend(svg, colour, top_mps, kWidth - kRight, 48);
+  const Quantity coloured = quantity(colour, missions);
+  draw_legend(svg, coloured, kWidth - kRight, 48);
   double y = 96;
   for (std::size_t i = 0; i < missions.size(); ++i) {
     const MissionResult& r = missions[i].result;
@@ -213,17 +266,13 @@ std::string mission_svg(const Scene& scene, std::span<const MissionReport> missi
     svg.text(
         kLeft + 130, y,
         fmt::format("{} in {:.0f} s, mean {:.2f} m/s, {:.0f} kJ, {} decisions of {:.2f} s median, {} late",
-                    r.reason == "reached_goal" ? "reached the goal" : r.reason, r.mission_time_s,
-                    r.mean_velocity_mps, r.energy_kJ, r.decisions, r.latency_s.median, r.deadline_misses),
+                    outcome(r), r.mission_time_s, r.mean_velocity_mps, r.energy_kJ, r.decisions,
+                    r.latency_s.median, r.deadline_misses),
         "start", 13, kInk);
     const Frame f{scene.bounds_W.min_W.x(), scene.bounds_W.max_W.y(), scale, kLeft, y + 10};
     draw_world(svg, scene, f, panel);
-    draw_path(svg, missions[i], f, colour, top_mps);
-    svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="6" fill="#ffffff" stroke="{}" stroke-width="2.5"/>)",
-            f.x(scene.start_W.x()), f.y(scene.start_W.y()), kInk);
-    svg.add(
-        R"(<path d="M {0:.1f} {1:.1f} l 0 -18 l 13 5 l -13 5" fill="#e12d39" stroke="{2}" stroke-width="1.5"/>)",
-        f.x(scene.goal_W.x()), f.y(scene.goal_W.y()), kInk);
+    draw_path(svg, missions[i], f, coloured);
+    draw_ends(svg, scene, f);
     y += panel + 62;
   }
   const Frame charts{scene.bounds_W.min_W.x(), 0.0, scale, kLeft, 0.0};
@@ -244,6 +293,38 @@ std::string mission_svg(const Scene& scene, std::span<const MissionReport> missi
            "obstacles; red: congestion",
            "start", 12, kSoft);
   return svg.finish(kWidth, y + 4);
+}
+
+std::string maps_svg(const Scene& scene, std::span<const MissionReport> missions) {
+  Svg svg;
+  svg.text(kLeft, 34, scene.title, "start", 18, kInk, "bold");
+  constexpr double kGap = 70.0;
+  const auto columns = static_cast<double>(std::max<std::size_t>(missions.size(), 1));
+  const double width = (kWidth - kLeft - kRight - kGap * (columns - 1.0)) / columns;
+  const Vector3 size = scene.bounds_W.size();
+  const double scale = std::min(width / size.x(), kMaxPanel / size.y());
+  const double height = size.y() * scale;
+  const auto left = [&](std::size_t i) { return kLeft + (width + kGap) * static_cast<double>(i); };
+  for (std::size_t i = 0; i < missions.size(); ++i) {
+    const MissionResult& r = missions[i].result;
+    svg.text(left(i), 62,
+             fmt::format("{}: {} in {:.0f} s, mean {:.2f} m/s", r.design, outcome(r), r.mission_time_s,
+                         r.mean_velocity_mps),
+             "start", 15, kInk, "bold");
+  }
+  double y = 110.0;
+  for (std::size_t k = 0; k < kPathColourName.size(); ++k) {
+    const Quantity q = quantity(static_cast<PathColour>(k), missions);
+    draw_legend(svg, q, kWidth - kRight, y - 28.0);
+    for (std::size_t i = 0; i < missions.size(); ++i) {
+      const Frame f{scene.bounds_W.min_W.x(), scene.bounds_W.max_W.y(), scale, left(i), y + 4.0};
+      draw_world(svg, scene, f, height);
+      draw_path(svg, missions[i], f, q);
+      draw_ends(svg, scene, f);
+    }
+    y += height + 76.0;
+  }
+  return svg.finish(kWidth, y - 28.0);
 }
 
 }  // namespace roborun::report

@@ -35,11 +35,17 @@ struct Scene {
   std::vector<double> heat_ratio;
 };
 
-enum class PathColour { kSpeed, kPrecision };
+enum class PathColour { kSpeed, kPrecision, kVolume, kLatency, kVisibility, kDeadline };
+inline constexpr std::array<const char*, 6> kPathColourName{"speed",   "precision",  "volume",
+                                                            "latency", "visibility", "deadline"};
 
 /// A complete SVG file without external resources. One panel a mission, true to scale, the path coloured by
-/// speed or by precision with a legend; below it speed, latency and precision over the way of all missions.
+/// one quantity with a legend; below it speed, latency and precision over the way of all missions.
 [[nodiscard]] std::string mission_svg(const Scene& scene, std::span<const MissionReport> missions,
                                       PathColour colour);
+
+/// A row for each quantity of PathColour, a column for each mission: the maps by which RoboRun shows what its
+/// two designs do in a high-precision and in a high-velocity mission. A complete SVG file.
+[[nodiscard]] std::string maps_svg(const Scene& scene, std::span<const MissionReport> missions);
 
 }  // namespace roborun::report

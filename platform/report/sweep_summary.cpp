@@ -25,8 +25,6 @@ double student_t(std::size_t degrees) {
          (5.0 * std::pow(z, 5) + 16.0 * z * z * z + 3.0 * z) / (96.0 * n * n);
 }
 
-bool counts(const MissionResult& r) { return r.reached_goal && !r.collided; }
-
 double velocity(const MissionResult& r) { return r.mean_velocity_mps; }
 double mission_time(const MissionResult& r) { return r.mission_time_s; }
 double energy(const MissionResult& r) { return r.energy_kJ; }
@@ -46,12 +44,68 @@ std::string shown(double value, int digits) {
   return std::isfinite(value) ? fmt::format("{:.{}f}", value, digits) : std::string("-");
 }
 
+/// Half the 95 % interval of the mean of `values`, by Student's t; NaN with fewer than two.
+double half_95(const std::vector<double>& values) {
+  const auto n = static_cast<double>(values.size());
+  if (values.size() < 2) return kNaN;
+  double mean = 0.0;
+  for (const double v : values) mean += v / n;
+  double square = 0.0;
+  for (const double v : values) square += (v - mean) * (v - mean);
+  return student_t(values.size() - 1) * std::sqrt(square / (n - 1.0) / n);
+}
+
+/// What pairs of missions add up to.
+struct Pairs {
+  std::array<double, 4> mine{}, theirs{};
+  std::vector<double> my_latency_s, their_latency_s;
+
+  void add(const MissionResult& m, const MissionResult& t) {
+    constexpr std::array<double (*)(const MissionResult&), 4> kValue{velocity, mission_time, energy,
+                                                                     cpu_per_decision};
+    for (std::size_t i = 0; i < kValue.size(); ++i) {
+      mine[i] += kValue[i](m);
+      theirs[i] += kValue[i](t);
+    }
+    my_latency_s.push_back(latency(m));
+    their_latency_s.push_back(latency(t));
+  }
+  /// In the order of Gain.
+  [[nodiscard]] std::array<double, 5> ratios() const {
+    return {mine[0] / theirs[0], theirs[1] / mine[1], theirs[2] / mine[2],
+            median(their_latency_s) / median(my_latency_s), theirs[3] / mine[3]};
+  }
+};
+
+constexpr const char* kGainRow = "{:<46} {:>5} {:>11} {:>11} {:>11} {:>11} {:>8}\n";
+
+}  // namespace
+
+bool counts(const MissionResult& r) { return r.reached_goal && !r.collided; }
+
 std::string shown(const Estimate& e, int digits) {
   return std::isfinite(e.half_95) ? fmt::format("{} +-{}", shown(e.mean, digits), shown(e.half_95, digits))
                                   : shown(e.mean, digits);
 }
 
-}  // namespace
+std::string gain_head() {
+  return fmt::format(fmt::runtime(kGainRow), "times as good, where both reached the goal", "pairs",
+                     "velocity", "shorter", "less energy", "latency", "less CPU");
+}
+
+std::string gain_row(const std::string& what, const Gain& g) {
+  return fmt::format(fmt::runtime(kGainRow), what, g.pairs, shown(g.velocity, 2), shown(g.mission_time, 2),
+                     shown(g.energy, 2), shown(g.latency, 1),
+                     shown(100.0 * (1.0 - 1.0 / g.cpu_s_per_decision.mean), 0) + " %");
+}
+
+Estimate estimate(const std::vector<double>& of_seeds) {
+  Estimate e;
+  for (const double v : of_seeds)
+    e.mean = (std::isfinite(e.mean) ? e.mean : 0.0) + v / static_cast<double>(of_seeds.size());
+  e.half_95 = half_95(of_seeds);
+  return e;
+}
 
 std::optional<Published> published(const std::string& design) {
   if (design == "static") return Published{0.4, 2093.0, 1000.0, 1.1, 1.1, 2.0};
@@ -78,13 +132,9 @@ Estimate estimate(const std::vector<const SweepRow*>& rows, double (*value)(cons
   Estimate e;
   if (all.count == 0) return e;
   e.mean = all.sum / all.count;
-  const std::size_t n = of_seed.size();
-  if (n < 2) return e;
-  double mean = 0.0;
-  for (const auto& [seed, s] : of_seed) mean += s.sum / s.count / static_cast<double>(n);
-  double square = 0.0;
-  for (const auto& [seed, s] : of_seed) square += (s.sum / s.count - mean) * (s.sum / s.count - mean);
-  e.half_95 = student_t(n - 1) * std::sqrt(square / static_cast<double>(n - 1) / static_cast<double>(n));
+  std::vector<double> means;
+  for (const auto& [seed, s] : of_seed) means.push_back(s.sum / s.count);
+  e.half_95 = half_95(means);
   return e;
 }
 
@@ -122,39 +172,43 @@ std::vector<DesignSummary> summarise(const std::vector<SweepRow>& rows) {
   return summaries;
 }
 
-Gain gain(const std::vector<SweepRow>& rows, const std::string& profile, const std::string& design,
-          const std::string& baseline) {
+Gain gain(const std::vector<const SweepRow*>& mine, const std::vector<const SweepRow*>& theirs) {
   std::map<std::pair<std::string, std::uint64_t>, const MissionResult*> base;
-  for (const SweepRow& row : rows) {
-    const MissionResult& r = row.result;
-    if (r.profile == profile && r.design == baseline && counts(r)) base[{r.env, r.seed}] = &r;
+  for (const SweepRow* row : theirs) {
+    if (counts(row->result)) base[{row->result.env, row->result.seed}] = &row->result;
   }
   Gain g;
-  std::array<double, 4> mine{};
-  std::array<double, 4> theirs{};
-  std::vector<double> my_latency_s;
-  std::vector<double> their_latency_s;
-  for (const SweepRow& row : rows) {
-    const MissionResult& r = row.result;
+  Pairs all;
+  std::map<std::uint64_t, Pairs> of_seed;
+  for (const SweepRow* row : mine) {
+    const MissionResult& r = row->result;
     const auto found = base.find({r.env, r.seed});
-    if (r.profile != profile || r.design != design || !counts(r) || found == base.end()) continue;
+    if (!counts(r) || found == base.end()) continue;
     ++g.pairs;
-    const MissionResult& b = *found->second;
-    constexpr std::array<double (*)(const MissionResult&), 4> kValue{velocity, mission_time, energy,
-                                                                     cpu_per_decision};
-    for (std::size_t i = 0; i < kValue.size(); ++i) {
-      mine[i] += kValue[i](r);
-      theirs[i] += kValue[i](b);
-    }
-    my_latency_s.push_back(latency(r));
-    their_latency_s.push_back(latency(b));
+    all.add(r, *found->second);
+    of_seed[r.seed].add(r, *found->second);
   }
-  g.velocity = mine[0] / theirs[0];
-  g.mission_time = mine[1] / theirs[1];
-  g.energy = mine[2] / theirs[2];
-  g.cpu_s_per_decision = mine[3] / theirs[3];
-  g.latency = median(my_latency_s) / median(their_latency_s);
+  if (g.pairs == 0) return g;
+  const std::array<Estimate*, 5> value{&g.velocity, &g.mission_time, &g.energy, &g.latency,
+                                       &g.cpu_s_per_decision};
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    std::vector<double> ratios;
+    for (const auto& [seed, pairs] : of_seed) ratios.push_back(pairs.ratios()[i]);
+    *value[i] = {all.ratios()[i], half_95(ratios)};
+  }
   return g;
+}
+
+Gain gain(const std::vector<SweepRow>& rows, const std::string& profile, const std::string& design,
+          const std::string& baseline) {
+  std::vector<const SweepRow*> mine;
+  std::vector<const SweepRow*> theirs;
+  for (const SweepRow& row : rows) {
+    if (row.result.profile != profile) continue;
+    if (row.result.design == design) mine.push_back(&row);
+    if (row.result.design == baseline) theirs.push_back(&row);
+  }
+  return gain(mine, theirs);
 }
 
 std::string sweep_table(const std::vector<SweepRow>& rows) {
@@ -176,19 +230,18 @@ std::string sweep_table(const std::vector<SweepRow>& rows) {
   }
   text +=
       "means over the missions that reached the goal; +-: 95 % interval over seeds (none with one seed)\n";
+  std::string gains;
   for (const DesignSummary& s : summaries) {
     for (const char* baseline : {"static", "static-fair"}) {
       if (s.design != "aware") continue;
       const Gain g = gain(rows, s.profile, s.design, baseline);
       if (g.pairs == 0) continue;
-      text += fmt::format(
-          "{}, {} against {} ({} pairs): {:.2f}x velocity, {:.2f}x shorter, {:.2f}x less energy, {:.1f}x "
-          "lower "
-          "latency, {:.0f} % less CPU\n",
-          s.profile, s.design, baseline, g.pairs, g.velocity, 1.0 / g.mission_time, 1.0 / g.energy,
-          1.0 / g.latency, 100.0 * (1.0 - g.cpu_s_per_decision));
+      gains += gain_row(fmt::format("{}, {} against {}", s.profile, s.design, baseline), g);
+      if (std::string_view(baseline) == "static")
+        gains += fmt::format(fmt::runtime(kGainRow), "  published", 27, "5", "4.5", "4", "11", "36 %");
     }
   }
+  if (!gains.empty()) text += '\n' + gain_head() + gains + '\n';
   for (const SweepRow& row : rows) {
     const MissionResult& r = row.result;
     if (counts(r)) continue;

@@ -43,10 +43,11 @@ struct DesignSummary {
   Estimate cpu_s_per_decision;
 };
 
-/// How many times as much a design has of something, over the missions (environment, seed) that both reached.
+/// How many times as good one is as another, over the missions (environment, seed) that both reached: faster,
+/// shorter, with less energy, latency and CPU time a decision. Intervals: each seed gives one ratio.
 struct Gain {
   int pairs{};
-  double velocity{}, mission_time{}, energy{}, latency{}, cpu_s_per_decision{};
+  Estimate velocity, mission_time, energy, latency, cpu_s_per_decision;
 };
 
 /// What RoboRun printed; NaN where it printed nothing. Source: FACTS of the paper: overall metrics, means
@@ -60,12 +61,23 @@ struct Published {
 
 /// In the order of first appearance.
 [[nodiscard]] std::vector<DesignSummary> summarise(const std::vector<SweepRow>& rows);
+[[nodiscard]] Gain gain(const std::vector<const SweepRow*>& mine, const std::vector<const SweepRow*>& theirs);
 /// Of `design` against `baseline`, in the same profile.
 [[nodiscard]] Gain gain(const std::vector<SweepRow>& rows, const std::string& profile,
                         const std::string& design, const std::string& baseline);
-/// Mean and interval of value(result) over those that reached the goal.
+/// True if a mission counts: it reached the goal and hit nothing.
+[[nodiscard]] bool counts(const MissionResult& result);
+/// Mean and interval of value(result) over the missions that count.
 [[nodiscard]] Estimate estimate(const std::vector<const SweepRow*>& rows,
                                 double (*value)(const MissionResult&));
+
+/// Of a number a seed: their mean, and its interval.
+[[nodiscard]] Estimate estimate(const std::vector<double>& of_seeds);
+/// "4.52 +-0.10", without the interval if there is none; "-" for NaN.
+[[nodiscard]] std::string shown(const Estimate& estimate, int digits);
+/// A table of gains: its head, and a row. At most 110 columns.
+[[nodiscard]] std::string gain_head();
+[[nodiscard]] std::string gain_row(const std::string& what, const Gain& gain);
 
 /// The table that a person reads at the end of `roborun sweep`: a row a design, published values below,
 /// gains, and every mission that did not reach the goal. Plain ASCII, at most 110 columns.

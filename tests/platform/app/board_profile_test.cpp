@@ -10,12 +10,12 @@ namespace {
 TEST(HostProfile, IsMeasuredOnceAndRepeatsFromItsFile) {
   const std::string path = test::scratch("host.toml");
   std::string note;
-  const Profile first = host(path, 1.0, note);
+  const Profile first = host(path, {}, 1.0, note);
   EXPECT_NE(note, "") << "says that it measured and where it wrote";
   note.clear();
-  const Profile again = host(path, 1.0, note);
+  const Profile again = host(path, {}, 1.0, note);
   EXPECT_EQ(note, "");
-  const Profile slower = host(path, 2.0, note);
+  const Profile slower = host(path, {}, 2.0, note);
   for (int level = 0; level < kPrecisionLevels; ++level) {
     core::Work work;
     work.level = level;

@@ -24,7 +24,7 @@ refuses "aware, static, static-fair" fly --design foo
 refuses "aware, static, static-fair" fly --design aware,,static
 refuses "aware, static, static-fair" fly --design aware,
 refuses "aware, static, static-fair" fly --design ""
-refuses "paper, host, or a file" fly --profile x
+refuses "paper, host, cortex-a72, or a file" fly --profile x
 refuses "cannot be opened" explain nope.csv --at 3
 refuses "no column" explain "$data/worlds/two_pillars.toml" --at 3
 refuses "cannot be written" fly --trace /nonexistent/x.csv
@@ -39,7 +39,7 @@ refuses "whole number" fly --seed -1
 refuses "whole number" fly --seed 1x
 refuses "own or octomap" fly --map foo
 refuses "must be own or ompl:NAME" fly --planner ompl:Foo
-refuses "speed or precision" fly --color red
+refuses "deadline or all" fly --color red
 refuses "package_delivery or search_and_rescue" fly --mission x
 refuses "cannot be opened" fly --world nope.toml
 refuses "must end in .toml, .bt or .ot" fly --world nope.xyz

@@ -61,7 +61,9 @@ std::string sweep_into(const std::string& name, const SweepPlan& plan, int jobs)
 TEST(Sweep, HasTheSameBytesWithOneJobWithTwoAndFromShards) {
   const auto one = files_of(sweep_into("one", small_plan(), 1));
   ASSERT_EQ(std::count(one.at("results.jsonl").begin(), one.at("results.jsonl").end(), '\n'), 8);
-  EXPECT_EQ(one.count("flight_aware.json"), 1U);
+  EXPECT_EQ(one.count("flight_aware_1.json"), 1U);
+  EXPECT_EQ(one.count("flight_aware_2.json"), 1U) << "every seed of the representative environment";
+  EXPECT_NE(one.at("tables.txt").find("zone"), std::string::npos);
   const std::string& page = one.at("report.html");
   EXPECT_NE(page.find("</svg>"), std::string::npos);
   for (const char* outside : {"href", "<script", "src="}) EXPECT_EQ(page.find(outside), std::string::npos);

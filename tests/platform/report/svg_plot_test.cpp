@@ -43,6 +43,26 @@ TEST(MissionSvg, IsWellFormedSelfContainedAndDrawsWhatItIsGiven) {
   }
 }
 
+TEST(MapsSvg, ShowsEveryQuantityOfEveryMission) {
+  std::vector<MissionReport> missions = {test::sample_mission("static", 0.5),
+                                         test::sample_mission("aware", 4.0)};
+  for (std::size_t i = 0; i < missions[1].decisions.size(); ++i)
+    missions[1].decisions[i].v0_m3 = 1e3 * static_cast<double>(i);
+  const std::string svg = maps_svg(scene(), missions);
+  EXPECT_TRUE(well_formed(svg));
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+  EXPECT_EQ(svg.find("inf"), std::string::npos);
+  EXPECT_EQ(count(svg, "path: "), kPathColourName.size());
+  EXPECT_EQ(count(svg, "#e12d39"), 2U * kPathColourName.size()) << "a flag a map";
+  EXPECT_TRUE(well_formed(maps_svg(scene(), {})));
+  // The volume of the aware mission goes through the colours; that of the static one stays at the lowest.
+  const std::string by_volume =
+      mission_svg(scene(), std::vector<MissionReport>{missions[1]}, PathColour::kVolume);
+  const std::string flat = mission_svg(scene(), std::vector<MissionReport>{missions[0]}, PathColour::kVolume);
+  EXPECT_GT(count(by_volume, "stroke-width=\"2.6\""), 15U);
+  EXPECT_LE(count(flat, "stroke-width=\"2.6\""), 2U);
+}
+
 TEST(MissionSvg, SurvivesAMissionWithoutDecisionsAndAWorldWithoutAnything) {
   Scene bare;
   bare.bounds_W = {{0.0, 0.0, 0.0}, {10.0, 10.0, 10.0}};

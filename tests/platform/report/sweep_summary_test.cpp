@@ -16,6 +16,7 @@ SweepRow row(const char* env, const char* design, std::uint64_t seed, double spe
   SweepRow r;
   r.result = test::sample_mission(design, speed_mps).result;
   r.result.env = env;
+  r.result.map = r.result.planner = "own";
   r.result.seed = seed;
   r.result.decisions = 100;
   r.result.cpu_s = 50.0;
@@ -91,13 +92,23 @@ TEST(SweepSummary, ComparesOnlyMissionsThatBothReached) {
   std::vector<SweepRow> rows{row("1", "aware", 1, 4.0), row("2", "aware", 1, 8.0), row("1", "static", 1, 0.5),
                              row("2", "static", 1, 0.5)};
   EXPECT_EQ(gain(rows, "paper", "aware", "static").pairs, 2);
-  EXPECT_NEAR(gain(rows, "paper", "aware", "static").velocity, 12.0, 1e-12);
+  EXPECT_NEAR(gain(rows, "paper", "aware", "static").velocity.mean, 12.0, 1e-12);
   rows[3].result.reached_goal = false;
   const Gain sut = gain(rows, "paper", "aware", "static");
   EXPECT_EQ(sut.pairs, 1);
-  EXPECT_NEAR(sut.velocity, 8.0, 1e-12);
-  EXPECT_NEAR(sut.mission_time, 1.0 / 8.0, 1e-12);
+  EXPECT_NEAR(sut.velocity.mean, 8.0, 1e-12);
+  EXPECT_NEAR(sut.mission_time.mean, 8.0, 1e-12);
+  EXPECT_TRUE(std::isnan(sut.velocity.half_95));
   EXPECT_EQ(gain(rows, "other", "aware", "static").pairs, 0);
+}
+
+TEST(SweepSummary, GivesTheIntervalOfAGainFromTheRatiosOfTheSeeds) {
+  // Ratios 8 and 12: mean 10, s = sqrt(8), 12.706 sqrt(8 / 2) = 25.412.
+  const std::vector<SweepRow> rows{row("1", "aware", 1, 4.0), row("1", "static", 1, 0.5),
+                                   row("1", "aware", 2, 6.0), row("1", "static", 2, 0.5)};
+  const Gain sut = gain(rows, "paper", "aware", "static");
+  EXPECT_NEAR(sut.velocity.mean, 10.0, 1e-12);
+  EXPECT_NEAR(sut.velocity.half_95, 25.412, 1e-3);
 }
 
 TEST(SweepSummary, TheTableNamesEachMissionThatFailedAndTheJsonHasTheAgreedFields) {
@@ -107,7 +118,8 @@ TEST(SweepSummary, TheTableNamesEachMissionThatFailedAndTheJsonHasTheAgreedField
   rows[1].result.reason = "no_path_to_goal";
   const std::string table = sweep_table(rows);
   EXPECT_NE(table.find("environment 2, paper, aware, seed 1: no_path_to_goal"), std::string::npos) << table;
-  EXPECT_NE(table.find("8.00x velocity"), std::string::npos) << table;
+  EXPECT_NE(table.find("aware against static                        1        8.00"), std::string::npos)
+      << table;
   const auto json = nlohmann::json::parse(sweep_json("paper27", rows, true));
   const auto& aware = json.at("designs").at("aware");
   EXPECT_EQ(aware.at("missions"), 2);
