@@ -200,7 +200,7 @@ void DecisionProgram::choose_site() noexcept {
 void DecisionProgram::judge() noexcept {
   const bool answer = out_.planner_status == Status::kNoPath || out_.planner_status == Status::kGoalBlocked;
   // On the way home even "no way" is a failure: nothing else will bring it down.
-  const bool fine = out_.kind == DecisionKind::kNew || report_.site_known || in_.climbing ||
+  const bool fine = out_.smoother_status == Status::kOk || report_.site_known || in_.climbing ||
                     (answer && mail_.report.read().action != Action::kReturn);
   report_.failures = fine ? 0 : report_.failures + 1;
   if (config_.map_refusals == nullptr) return;
