@@ -137,6 +137,8 @@ class DecisionProgram final : public core::LaneProgram {
   [[nodiscard]] std::uint64_t decisions() const noexcept { return decisions_; }
   /// Trajectories that came too late for their own start; never decreases.
   [[nodiscard]] std::uint64_t too_late() const noexcept { return too_late_; }
+  /// Stops offered right after the map, before the decision was done; never decreases.
+  [[nodiscard]] std::uint64_t early_stops() const noexcept { return early_stops_; }
 
  private:
   void gather(core::LaneExecutive& lane) noexcept;
@@ -146,7 +148,8 @@ class DecisionProgram final : public core::LaneProgram {
   void publish(MonotonicTime due) noexcept;
   void choose_site() noexcept;
   void judge() noexcept;
-  void hand_over(const core::LaneExecutive& lane) noexcept;
+  /// False if there is nothing to hand over, or it is too late for it.
+  bool hand_over(const core::LaneExecutive& lane) noexcept;
   /// What the flight lane flies at `now`. What was handed over counts from its start on: the report of that
   /// very frame may not be there yet.
   [[nodiscard]] const Trajectory& flown(MonotonicTime now) const noexcept;
@@ -160,6 +163,7 @@ class DecisionProgram final : public core::LaneProgram {
   DecisionOutput out_{};
   std::uint64_t decisions_{0};
   std::uint64_t too_late_{0};
+  std::uint64_t early_stops_{0};
   std::atomic<bool> given_up_{false};
   Trajectory handed_over_{};
   DecisionReport report_{};
