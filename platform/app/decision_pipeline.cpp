@@ -15,9 +15,10 @@ constexpr double kTrajectoryStep_s = 0.5;  // of the points that order the space
 constexpr std::size_t kTrajectoryPoints = 32;
 constexpr double kCornerRoom_m = 0.25;
 constexpr double kAtRest_mps = 0.05;
-constexpr double kMotionReach_m = 10.0;  // farther away depth noise looks like motion
+constexpr double kMotionReach_m = 15.0;  // farther away depth noise looks like motion
 constexpr int kMotionPoints = 3;
 constexpr double kStanding_mps = 0.5;
+constexpr double kTooFast = 1.5;
 constexpr Nanos kMotionMemory{3'000'000'000};
 /// What the way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
 constexpr double kBeyond_mps = 2.0;
@@ -125,8 +126,11 @@ void DecisionPipeline::check_committed(const DecisionInput& in, DecisionOutput& 
   const stages::PolledView polled(known, budget, work);
   const double from_s = seconds(in.now - in.committed->start_time);
   const double until_s = free_until_s(polled, *in.committed, from_s, config_.vehicle_radius_m, work.units);
-  if (until_s > 1e300) return;
-  const MonotonicTime free_until = in.committed->start_time + from_seconds(until_s);
+  // Where something moves, what is fast now is not flown on until a slower plan is there.
+  const bool too_fast = out.motion && in.v_WB.norm() > kTooFast * out.decision.point.speed_limit_mps;
+  if (until_s > 1e300 && !too_fast) return;
+  const MonotonicTime free_until =
+      until_s > 1e300 ? MonotonicTime::max() : in.committed->start_time + from_seconds(until_s);
   offer_stop(in, free_until, known, work, out);
 }
 
@@ -134,8 +138,6 @@ void DecisionPipeline::offer_stop(const DecisionInput& in, MonotonicTime free_un
                                   const stages::MapView& known, core::Work& work,
                                   DecisionOutput& out) noexcept {
   const MonotonicTime soonest = in.now + out.latency + config_.minor_frame;
-  // Another stop would begin gently once more, and end later than the one that is being flown.
-  if (soonest >= in.committed->start_time + from_seconds(in.committed->brake_begin_s)) return;
   const TrajectoryPoint then = in.committed->at(soonest);
   Trajectory stop;
   if (then.v_W.norm() <= kAtRest_mps ||
@@ -212,7 +214,8 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   // A new trajectory begins slowly and another one may be there next time: what is flown now is kept as long
   // as it is free, has not begun to brake and arrives no later.
   const MonotonicTime brakes = in.committed->start_time + from_seconds(in.committed->brake_begin_s);
-  const bool keeps = committed_until_s > 1e300 && start.v_W.norm() < 1.1 * point.speed_limit_mps && takes_over < brakes &&
+  const bool keeps = committed_until_s > 1e300 && start.v_W.norm() < 1.1 * point.speed_limit_mps &&
+                     takes_over < brakes &&
                      arrival_s(*in.committed, in) <= arrival_s(smoothed.trajectory, in);
   if (out.smoother_status == Status::kOk && !keeps) {
     out.kind = DecisionKind::kNew;

@@ -59,7 +59,7 @@ struct DecisionOutput {
   governor::Decision decision{};
   std::array<core::Work, core::kStageCount> work{};
   std::array<Nanos, core::kStageCount> cost{};
-  bool motion{};  ///< Something was seen to move nearby, not long ago.
+  bool motion{};    ///< Something was seen to move nearby, not long ago.
   Nanos latency{};  ///< Sum of the costs: when the result is there, counted from input.now.
 };
 
@@ -95,8 +95,8 @@ class DecisionPipeline {
   void integrate(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// What is flown, on the map that just got its images.
   void check_committed(const DecisionInput& in, DecisionOutput& out) noexcept;
-  /// The stop that takes over as soon as it can, if it stays free until `free_until` at least: a straight stop
-  /// out of a descent meets the ground sooner than what it replaces.
+  /// The stop that takes over as soon as it can, if it stays free until `free_until` at least: a straight
+  /// stop out of a descent meets the ground sooner than what it replaces.
   void offer_stop(const DecisionInput& in, MonotonicTime free_until, const stages::MapView& known,
                   core::Work& work, DecisionOutput& out) noexcept;
   void export_map(const DecisionInput& in, DecisionOutput& out) noexcept;

@@ -18,9 +18,9 @@
 namespace roborun::app {
 namespace {
 
-constexpr std::array<const char*, 10> kOutcomes{"reached_goal", "landed",        "holding",
-                                               "terminated",   "killed",        "collision",
-                                               "time_limit",   "battery_empty", "no_path_to_goal", "struck"};
+constexpr std::array<const char*, 10> kOutcomes{"reached_goal",    "landed",    "holding",    "terminated",
+                                                "killed",          "collision", "time_limit", "battery_empty",
+                                                "no_path_to_goal", "struck"};
 
 class ScenarioReader {
  public:
@@ -191,8 +191,8 @@ Scenario load_scenario(const std::string& path) { return ScenarioReader(path).re
 
 report::MissionReport fly_scenario(const Scenario& s) {
   sitl::World world = s.world.empty() ? sitl::generate(sitl::environment(s.environment).knobs,
-                                                             sitl::Mission::kPackageDelivery, s.config.seed)
-                                            : sitl::load_world(s.world, {});
+                                                       sitl::Mission::kPackageDelivery, s.config.seed)
+                                      : sitl::load_world(s.world, {});
   world.add(s.bodies);
   report::MissionReport report = fly_mission(world, s.config, {});
   report.result.env = s.name;

@@ -36,8 +36,8 @@ struct Scenario {
 /// Tables [scenario] about, world (relative to this file) or environment, seed, design, answers, cost_factor
 /// (of computing, against the paper's machine); those of a
 /// settings file (settings_file.hpp); any number of [[fault]] with component, kind, instance, phase, at_s,
-/// for_s; [[body]] as in a world file (body_reader.hpp); [expect] with the fields above. Throws sitl::InputError with file, line, key and what would be
-/// right.
+/// for_s; [[body]] as in a world file (body_reader.hpp); [expect] with the fields above. Throws
+/// sitl::InputError with file, line, key and what would be right.
 [[nodiscard]] Scenario load_scenario(const std::string& path);
 /// Flies it. Throws sitl::InputError for a world that cannot be flown.
 [[nodiscard]] report::MissionReport fly_scenario(const Scenario& scenario);

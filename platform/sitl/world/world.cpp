@@ -244,9 +244,8 @@ std::optional<World::NearestBody> World::nearest_body(const Vector3& p_W, double
   std::optional<NearestBody> nearest;
   for (const Body& body : description_.bodies) {
     Vector3 core_W = body.center_W(when);
-    const double distance_m = body.height_m > 0.0
-                                  ? pillar_distance_m(cylinder_of(body, core_W), p_W)
-                                  : std::max((p_W - core_W).norm() - body.radius_m, 0.0);
+    const double distance_m = body.height_m > 0.0 ? pillar_distance_m(cylinder_of(body, core_W), p_W)
+                                                  : std::max((p_W - core_W).norm() - body.radius_m, 0.0);
     if (distance_m >= (nearest ? nearest->distance_m : cap_m)) continue;
     const double half_m = 0.5 * body.height_m;
     core_W.z() = std::clamp(p_W.z(), core_W.z() - half_m, core_W.z() + half_m);

@@ -22,7 +22,8 @@ struct Pillar {
   double top_m{20.0};
 };
 
-/// A sphere, or an upright cylinder, that goes along its way-points at a constant speed and stays at the last.
+/// A sphere, or an upright cylinder, that goes along its way-points at a constant speed and stays at the
+/// last.
 struct Body {
   double radius_m{};
   double height_m{0.0};  ///< Of the cylinder; 0: a sphere.
@@ -70,7 +71,7 @@ class World {
   /// inside an obstacle.
   [[nodiscard]] double clearance_m(const Vector3& p_W, double cap_m) const noexcept;
   struct NearestBody {
-    double distance_m{};  ///< To its surface; 0 inside.
+    double distance_m{};               ///< To its surface; 0 inside.
     Vector3 core_W = Vector3::Zero();  ///< The nearest point of its axis, or its centre.
   };
   /// The body nearest to the point at `when`, if one is nearer than cap_m.

@@ -35,9 +35,9 @@ inline MissionConfig crossing_mission(double cost_factor, std::uint64_t seed) {
 /// 36 m to the goal, and three bodies of 0.3 to 0.8 m radius at 1 to 3 m/s that cross the straight line from
 /// either side, each at about the time at which an undisturbed vehicle comes by.
 inline sitl::World crossing_world(std::uint64_t number) {
-  constexpr double kReady_s = 8.0;    // climb and first decision are over
+  constexpr double kReady_s = 8.0;     // climb and first decision are over
   constexpr double kCruise_mps = 3.0;  // on the average
-  constexpr double kAway_m = 24.0;    // where a body begins and ends
+  constexpr double kAway_m = 24.0;     // where a body begins and ends
   core::CounterRng rng(number, 600);
   sitl::WorldDescription d;
   d.bounds_W = {Vector3(-6, -12, 1.5), Vector3(42, 12, 6)};

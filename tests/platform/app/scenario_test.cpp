@@ -19,7 +19,9 @@ TEST(ScenarioFile, ReadsEveryTable) {
       "all.toml", kHead + "seed = 7\nanswers = false\n[camera]\npixels = 48\n[fog]\nvisibility_m = 9\n" +
                       "[fence]\naltitude_m = [1, 9]\nkeep_out = [{ circle = [5, 5, 2] }]\n" +
                       "[[fault]]\ncomponent = \"esc\"\nkind = \"off\"\ninstance = 3\nphase = \"return\"\n" +
-                      "at_s = 1.5\nfor_s = 2\n[[body]]\nradius = 1\nspeed = 3\npath = [[1, 2, 3], [4, 5, 6]]\n[[fault]]\ncomponent = \"wind\"\nkind = \"on\"\n" + kTail +
+                      "at_s = 1.5\nfor_s = 2\n[[body]]\nradius = 1\nspeed = 3\npath = [[1, 2, 3], [4, 5, "
+                      "6]]\n[[fault]]\ncomponent = \"wind\"\nkind = \"on\"\n" +
+                      kTail +
                       "action = \"land\"\ncondition = \"gnss\"\nwithin_s = 2\nlanding_site_known = true\n"));
   EXPECT_EQ(s.name, "all");
   EXPECT_EQ(s.config.seed, 7U);

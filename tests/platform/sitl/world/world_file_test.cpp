@@ -43,8 +43,9 @@ TEST_F(WorldFile, ReadsPillarsBoxesBoundsAndEnds) {
 
 TEST_F(WorldFile, ReadsMovingBodies) {
   const World world = load_world(
-      write(good_ + "[[body]]\nradius = 0.5\nheight = 3\nspeed = 2\nat_s = 4\npath = [[9, 9, 2], [9, -9, 2]]\n"
-                    "[[body]]\nradius = 1\npath = [[50, 0, 5]]\n"),
+      write(good_ +
+            "[[body]]\nradius = 0.5\nheight = 3\nspeed = 2\nat_s = 4\npath = [[9, 9, 2], [9, -9, 2]]\n"
+            "[[body]]\nradius = 1\npath = [[50, 0, 5]]\n"),
       {});
   ASSERT_EQ(world.bodies().size(), 2U);
   EXPECT_EQ(world.bodies()[0].height_m, 3.0);
@@ -84,7 +85,8 @@ TEST_F(WorldFile, RefusesInOneLineThatNamesFileLineAndKey) {
       {replaced("max = [22", "max = [12"), "max: must be above min on every axis"},
       {good_ + "[[body]]\npath = [[0, 0, 1]]\n", ":12: radius: missing in [[body]]"},
       {good_ + "[[body]]\nradius = 0\npath = [[0, 0, 1]]\n", ":13: radius: must be above 0"},
-      {good_ + "[[body]]\nradius = 1\nspeed = -1\npath = [[0, 0, 1]]\n", ":14: speed: must be a number from 0"},
+      {good_ + "[[body]]\nradius = 1\nspeed = -1\npath = [[0, 0, 1]]\n",
+       ":14: speed: must be a number from 0"},
       {good_ + "[[body]]\nradius = 1\npath = []\n", ":14: path: must be one to 1000 points"},
       {good_ + "[[body]]\nradius = 1\npath = [[0, 0]]\n", ":14: path: must be three numbers"},
       {good_ + "[[body]]\nradius = 1\nspeeed = 2\n", ":14: speeed: unknown key in [[body]]"},
