@@ -300,10 +300,7 @@ void DecisionProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
   }
   pipeline_.run(stage, in_, out_);
   if (slot == SlotId::kMap && out_.kind == DecisionKind::kBrake) {
-    if (hand_over(lane)) {
-      in_.committed = &handed_over_;
-      ++early_stops_;
-    }
+    if (hand_over(lane)) in_.committed = &handed_over_;
     out_.kind = DecisionKind::kKeep;
   }
   if (slot == SlotId::kPlanner) judge();

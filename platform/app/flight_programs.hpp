@@ -137,8 +137,6 @@ class DecisionProgram final : public core::LaneProgram {
   [[nodiscard]] std::uint64_t decisions() const noexcept { return decisions_; }
   /// Trajectories that came too late for their own start; never decreases.
   [[nodiscard]] std::uint64_t too_late() const noexcept { return too_late_; }
-  /// Stops offered right after the map, before the decision was done; never decreases.
-  [[nodiscard]] std::uint64_t early_stops() const noexcept { return early_stops_; }
 
  private:
   void gather(core::LaneExecutive& lane) noexcept;
@@ -163,7 +161,6 @@ class DecisionProgram final : public core::LaneProgram {
   DecisionOutput out_{};
   std::uint64_t decisions_{0};
   std::uint64_t too_late_{0};
-  std::uint64_t early_stops_{0};
   std::atomic<bool> given_up_{false};
   Trajectory handed_over_{};
   DecisionReport report_{};
