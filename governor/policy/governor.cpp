@@ -164,7 +164,8 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   d.source = has_outlook ? BudgetSource::kTrajectory : BudgetSource::kVisibility;
   if (situation.surveying) d.time_budget = policy.longest_budget;
   double deadline_s = seconds(d.time_budget) / policy.decisions_per_budget;
-  const double useful_s = std::max(seconds(policy.longest), needed_s(coarsest, 1.0));
+  const Nanos longest = situation.motion ? policy.shortest : policy.longest;
+  const double useful_s = std::max(seconds(longest), needed_s(coarsest, 1.0));
   if (deadline_s >= useful_s) {
     deadline_s = useful_s;
     d.source = extra > 0 ? BudgetSource::kFailures : BudgetSource::kLongest;
@@ -219,7 +220,9 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
 
   // 4. How fast may the next trajectory be? As fast as it can still stop inside known free space, which the
   // smoother sees to.
-  const double speed_mps = near_goal ? std::min(policy.near_goal_speed_mps, v_max_mps_) : v_max_mps_;
+  double speed_mps = v_max_mps_;
+  if (near_goal) speed_mps = std::min(speed_mps, policy.near_goal_speed_mps);
+  if (situation.motion) speed_mps = std::min(speed_mps, policy.motion_speed_mps);
 
   d.point = {d.solution.p0_level, d.solution.p1_level,      d.solution.v0_m3, d.solution.v1_m3,
              d.solution.v2_m3,    whole_frames(deadline_s), speed_mps};

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/memory/static_vector.hpp"
+#include "stages/perception/polled_view.hpp"
 #include "stages/planning/fenced_view.hpp"
 
 namespace roborun::app {
@@ -13,6 +14,12 @@ constexpr std::size_t index(core::StageId id) noexcept { return static_cast<std:
 constexpr double kTrajectoryStep_s = 0.5;  // of the points that order the space by distance
 constexpr std::size_t kTrajectoryPoints = 32;
 constexpr double kCornerRoom_m = 0.25;
+constexpr double kAtRest_mps = 0.05;
+constexpr double kMotionReach_m = 15.0;  // farther away depth noise looks like motion
+constexpr int kMotionPoints = 3;
+constexpr double kStanding_mps = 0.5;
+constexpr double kTooFast = 1.5;
+constexpr Nanos kMotionMemory{3'000'000'000};
 /// What the way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
 constexpr double kBeyond_mps = 2.0;
 
@@ -56,6 +63,21 @@ core::MeteredBudget DecisionPipeline::table_budget_of(core::StageId id) noexcept
   return {meter_, id, meter_.grant(id, core::slot(core::slot_of(id)).budget)};
 }
 
+bool DecisionPipeline::sees_motion(const DecisionInput& in, const Aabb& relevant_W, core::StageBudget& budget,
+                                   core::Work& work) const noexcept {
+  const stages::PolledView known(map_.view(), budget, work);
+  int appeared = 0;
+  for (const stages::CloudPoint& point : cloud_.points()) {
+    const Vector3 offset = point.p_W - in.p_WB;
+    const bool behind = offset.dot(in.v_WB) < 0.0 && in.v_WB.norm() > kStanding_mps;
+    if (offset.norm() > kMotionReach_m || behind || !relevant_W.contains(point.p_W)) continue;
+    if (known.is_free_at_finest(Aabb::around(point.p_W, 0.5 * kFinestCell_m), work.units) &&
+        ++appeared == kMotionPoints)
+      return true;
+  }
+  return false;
+}
+
 void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) noexcept {
   core::MeteredBudget budget = table_budget_of(core::StageId::kPointCloud);
   core::Work work;
@@ -63,6 +85,8 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   const double r_m = radius_m();
   const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m),
                         config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
+  if (sees_motion(in, relevant_W, budget, work)) motion_until_ = in.now + kMotionMemory;
+  out.motion = in.now < motion_until_;
   (void)profile_space({}, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W,
                       relevant_W, r_m, out.profile, budget, work);
   out.profile.sensor_volume_m3 = cloud_.seen_volume_m3();
@@ -72,7 +96,8 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
 }
 
 void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noexcept {
-  out.decision = governor_.decide(out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing});
+  out.decision =
+      governor_.decide(out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing, out.motion});
   if (out.decision.predicted_s[index(core::StageId::kGovernor)] > 0.0)
     charge(core::StageId::kGovernor, {}, out);
 }
@@ -93,6 +118,40 @@ void DecisionPipeline::integrate(const DecisionInput& in, DecisionOutput& out) n
   charge(core::StageId::kMap, integrated.work, out);
 }
 
+void DecisionPipeline::check_committed(const DecisionInput& in, DecisionOutput& out) noexcept {
+  if (in.climbing) return;  // through space that is not known yet
+  const stages::FencedView fenced(map_.view(), config_.fence);
+  const stages::FinestView known(config_.fence.empty() ? map_.view() : fenced);
+  meter_.charge_to(core::StageId::kPlanner);
+  core::MeteredBudget budget = budget_of(core::StageId::kPlanner, out);
+  core::Work& work = out.work[index(core::StageId::kPlanner)];
+  const stages::PolledView polled(known, budget, work);
+  const double from_s = seconds(in.now - in.committed->start_time);
+  const double until_s = free_until_s(polled, *in.committed, from_s, config_.vehicle_radius_m, work.units);
+  // Where something moves, what is fast now is not flown on until a slower plan is there.
+  const bool too_fast = out.motion && in.v_WB.norm() > kTooFast * out.decision.point.speed_limit_mps;
+  if (until_s > 1e300 && !too_fast) return;
+  const MonotonicTime free_until =
+      until_s > 1e300 ? MonotonicTime::max() : in.committed->start_time + from_seconds(until_s);
+  offer_stop(in, free_until, known, work, out);
+}
+
+void DecisionPipeline::offer_stop(const DecisionInput& in, MonotonicTime free_until,
+                                  const stages::MapView& known, core::Work& work,
+                                  DecisionOutput& out) noexcept {
+  const MonotonicTime soonest = in.now + out.latency + config_.minor_frame;
+  const TrajectoryPoint then = in.committed->at(soonest);
+  Trajectory stop;
+  if (then.v_W.norm() <= kAtRest_mps ||
+      smoother_.brake(then, soonest, {config_.acceleration_mps2, config_.acceleration_mps2}, stop) !=
+          Status::kOk)
+    return;
+  const double stop_free_s = free_until_s(known, stop, 0.0, config_.vehicle_radius_m, work.units);
+  if (stop_free_s < 1e300 && soonest + from_seconds(stop_free_s) < free_until) return;
+  out.kind = DecisionKind::kBrake;
+  out.trajectory = stop;
+}
+
 void DecisionPipeline::export_map(const DecisionInput& in, DecisionOutput& out) noexcept {
   const OperatingPoint& point = out.decision.point;
   core::MeteredBudget budget = budget_of(core::StageId::kExport, out);
@@ -110,20 +169,16 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   const TrajectoryPoint start = in.committed->at(takes_over);
   const double r_m = radius_m();
 
-  // Is what we fly still free? If not, a stop takes over as soon as it can, unless it would end the freedom
-  // sooner: a straight stop out of a descent meets the ground.
   const stages::FinestView known(view);
-  std::uint64_t check_lookups = 0;
+  core::Work planner_work = out.work[index(core::StageId::kPlanner)];
   const double from_s = seconds(in.now - in.committed->start_time);
   const double committed_until_s =
-      free_until_s(known, *in.committed, from_s, config_.vehicle_radius_m, check_lookups);
+      free_until_s(known, *in.committed, from_s, config_.vehicle_radius_m, planner_work.units);
 
   // First with room for the smoother to cut corners, then as tight as the vehicle can fly.
   stages::SmoothResult smoothed;
-  core::Work planner_work;
   core::Work smoother_work;
   planner_work.level = point.p1_level;
-  planner_work.units = check_lookups;
   core::MeteredBudget planner_budget = budget_of(core::StageId::kPlanner, out);
   core::MeteredBudget smoother_budget = table_budget_of(core::StageId::kSmoother);
   for (const double room_m : {kCornerRoom_m, 0.0}) {
@@ -164,25 +219,15 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   // A new trajectory begins slowly and another one may be there next time: what is flown now is kept as long
   // as it is free, has not begun to brake and arrives no later.
   const MonotonicTime brakes = in.committed->start_time + from_seconds(in.committed->brake_begin_s);
-  const bool keeps = committed_until_s > 1e300 && takes_over < brakes &&
+  const bool keeps = committed_until_s > 1e300 && start.v_W.norm() < 1.1 * point.speed_limit_mps &&
+                     takes_over < brakes &&
                      arrival_s(*in.committed, in) <= arrival_s(smoothed.trajectory, in);
   if (out.smoother_status == Status::kOk && !keeps) {
     out.kind = DecisionKind::kNew;
     out.trajectory = smoothed.trajectory;
   } else if (committed_until_s < 1e300 && !in.climbing) {
-    const MonotonicTime soonest = in.now + out.latency + config_.minor_frame;
-    const TrajectoryPoint then = in.committed->at(soonest);
-    Trajectory stop;
-    if (then.v_W.norm() > 0.05 &&
-        smoother_.brake(then, soonest, {config_.acceleration_mps2, config_.acceleration_mps2}, stop) ==
-            Status::kOk) {
-      const double stop_until_s = seconds(soonest - in.committed->start_time) +
-                                  free_until_s(known, stop, 0.0, config_.vehicle_radius_m, check_lookups);
-      if (stop_until_s >= committed_until_s) {
-        out.kind = DecisionKind::kBrake;
-        out.trajectory = stop;
-      }
-    }
+    const MonotonicTime free_until = in.committed->start_time + from_seconds(committed_until_s);
+    offer_stop(in, free_until, known, smoother_work, out);
   }
 }
 
@@ -194,7 +239,8 @@ void DecisionPipeline::run(core::StageId id, const DecisionInput& in, DecisionOu
     case core::StageId::kGovernor:
       return govern(in, out);
     case core::StageId::kMap:
-      return integrate(in, out);
+      integrate(in, out);
+      return check_committed(in, out);
     case core::StageId::kExport:
       return export_map(in, out);
     case core::StageId::kPlanner:

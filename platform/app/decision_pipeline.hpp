@@ -47,7 +47,7 @@ struct DecisionInput {
 enum class DecisionKind : std::uint8_t {
   kKeep,   ///< Nothing better: fly on, the committed trajectory ends in a stop.
   kNew,    ///< `trajectory` takes over at its start time.
-  kBrake,  ///< The committed trajectory is no longer free: `trajectory` is the stop.
+  kBrake,  ///< The committed trajectory is no longer free: `trajectory` is the stop. Also after the map.
 };
 
 struct DecisionOutput {
@@ -60,6 +60,7 @@ struct DecisionOutput {
   governor::Decision decision{};
   std::array<core::Work, core::kStageCount> work{};
   std::array<Nanos, core::kStageCount> cost{};
+  bool motion{};    ///< Something was seen to move nearby, not long ago.
   Nanos latency{};  ///< Sum of the costs: when the result is there, counted from input.now.
 };
 
@@ -74,6 +75,9 @@ class DecisionPipeline {
 
   /// One stage of a decision; all of them in order make one. `out` is begun by the first (kPointCloud). The
   /// smoother alternates with the planner in the planner's turn, each charged for its own, and has no turn.
+  /// After kMap `out.kind` may be kBrake: what is flown is blocked in the newest map, and the rest of the
+  /// decision would be too long to wait. Whoever flies the stop then gives it as in.committed to the stages
+  /// that follow, and takes kind back to kKeep.
   /// RT-safe: no allocation; bounded by the stages' budgets.
   void run(core::StageId id, const DecisionInput& in, DecisionOutput& out) noexcept;
   /// Of the map, as the planner sees it but for the fence.
@@ -84,8 +88,18 @@ class DecisionPipeline {
  private:
   void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
   void perceive(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// Surfaces near the vehicle where the map, before it gets these images, knows free space. Not behind it:
+  /// who is followed must not slow down.
+  [[nodiscard]] bool sees_motion(const DecisionInput& in, const Aabb& relevant_W, core::StageBudget& budget,
+                                 core::Work& work) const noexcept;
   void govern(const DecisionInput& in, DecisionOutput& out) noexcept;
   void integrate(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// What is flown, on the map that just got its images.
+  void check_committed(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// The stop that takes over as soon as it can, if it stays free until `free_until` at least: a straight
+  /// stop out of a descent meets the ground sooner than what it replaces.
+  void offer_stop(const DecisionInput& in, MonotonicTime free_until, const stages::MapView& known,
+                  core::Work& work, DecisionOutput& out) noexcept;
   void export_map(const DecisionInput& in, DecisionOutput& out) noexcept;
   void plan(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// What is left of the deadline for this stage, when the stages after it get what was predicted for them.
@@ -101,7 +115,8 @@ class DecisionPipeline {
   stages::Planner& planner_;
   stages::Smoother& smoother_;
   stages::Path kept_W_;  ///< What was planned last.
-  int failures_{0};      ///< Decisions in a row without a trajectory.
+  MonotonicTime motion_until_{};
+  int failures_{0};  ///< Decisions in a row without a trajectory.
 };
 
 }  // namespace roborun::app

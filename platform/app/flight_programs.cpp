@@ -257,18 +257,19 @@ const Trajectory& DecisionProgram::flown(MonotonicTime now) const noexcept {
   return newer ? handed_over_ : reported;
 }
 
-void DecisionProgram::hand_over(const core::LaneExecutive& lane) noexcept {
-  if (out_.kind == DecisionKind::kKeep) return;
+bool DecisionProgram::hand_over(const core::LaneExecutive& lane) noexcept {
+  if (out_.kind == DecisionKind::kKeep) return false;
   // Too late for its own start: the vehicle already flies its braking tail, and the result is of no use. A
   // stop is still better a little late; after a stall it would begin where the vehicle is no more.
   const Nanos latest = out_.kind == DecisionKind::kNew ? Nanos{0} : kLatestStop;
   if (out_.trajectory.start_time + latest < lane.now()) {
     ++too_late_;
-    return;
+    return false;
   }
   handed_over_ = out_.trajectory;
   mail_.offer.draft() = {out_.trajectory, out_.kind == DecisionKind::kBrake};
   mail_.offer.publish();
+  return true;
 }
 
 void WatchdogProgram::run(SlotId, core::LaneExecutive& lane) noexcept {
@@ -292,7 +293,7 @@ void WatchdogProgram::run(SlotId, core::LaneExecutive& lane) noexcept {
 
 void DecisionProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
   if (slot == SlotId::kGather) return gather(lane);
-  if (slot == SlotId::kHandOver) return hand_over(lane);
+  if (slot == SlotId::kHandOver) return (void)hand_over(lane);
   const auto stage =
       static_cast<core::StageId>(static_cast<int>(slot) - static_cast<int>(SlotId::kPointCloud));
   if (slot == SlotId::kPlanner) {
@@ -300,6 +301,10 @@ void DecisionProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
     if (report_.site_known) in_.goal_W = report_.site_W;
   }
   pipeline_.run(stage, in_, out_);
+  if (slot == SlotId::kMap && out_.kind == DecisionKind::kBrake) {
+    if (hand_over(lane)) in_.committed = &handed_over_;
+    out_.kind = DecisionKind::kKeep;
+  }
   if (slot == SlotId::kPlanner) judge();
   if (slot == SlotId::kGovernor || slot == SlotId::kPlanner)
     publish(lane.release() + out_.decision.point.deadline);

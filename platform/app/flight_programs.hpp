@@ -147,7 +147,8 @@ class DecisionProgram final : public core::LaneProgram {
   void publish(MonotonicTime due) noexcept;
   void choose_site() noexcept;
   void judge() noexcept;
-  void hand_over(const core::LaneExecutive& lane) noexcept;
+  /// False if there is nothing to hand over, or it is too late for it.
+  bool hand_over(const core::LaneExecutive& lane) noexcept;
   /// What the flight lane flies at `now`. What was handed over counts from its start on: the report of that
   /// very frame may not be there yet.
   [[nodiscard]] const Trajectory& flown(MonotonicTime now) const noexcept;

@@ -22,7 +22,8 @@ namespace {
 constexpr double kReached_m = 1.0;
 constexpr double kReachedSpeed_mps = 0.5;
 constexpr double kHover_mps = 0.3;
-constexpr double kHolding_s = 5.0;  // of hovering, until a hold counts as the end
+constexpr double kOwnApproach_mps = 0.3;  // less is swaying on the spot
+constexpr double kHolding_s = 5.0;        // of hovering, until a hold counts as the end
 constexpr double kHardTouchdown_mps = 2.0;
 constexpr double kStorm_mps = 18.0;
 constexpr double kGiveUpAfter_s = 60.0;  // what cannot even stop
@@ -214,6 +215,11 @@ const char* MissionRun::end_reason() {
   if (!motors_off && (world_.clearance_m(s.p_WB, radius_m) < radius_m || down || hard)) {
     report_.result.collided = true;
     return "collision";
+  }
+  if (const auto body = world_.nearest_body(s.p_WB, radius_m, flight_.now())) {
+    const Vector3 to_body = body->core_W - s.p_WB;
+    report_.result.collided = s.v_WB.dot(to_body) > kOwnApproach_mps * to_body.norm();
+    return report_.result.collided ? "collision" : "struck";
   }
   if (action != governor::Action::kGoOn) {
     if (const char* reason = failsafe_reason()) return reason;

@@ -9,6 +9,7 @@
 #include "platform/app/arguments.hpp"
 #include "platform/app/board_profile.hpp"
 #include "platform/app/settings_file.hpp"
+#include "platform/sitl/world/body_reader.hpp"
 #include "platform/sitl/world/generator.hpp"
 #include "platform/sitl/world/text_file.hpp"
 #include "platform/sitl/world/toml_reader.hpp"
@@ -17,9 +18,9 @@
 namespace roborun::app {
 namespace {
 
-constexpr std::array<const char*, 9> kOutcomes{"reached_goal", "landed",        "holding",
-                                               "terminated",   "killed",        "collision",
-                                               "time_limit",   "battery_empty", "no_path_to_goal"};
+constexpr std::array<const char*, 10> kOutcomes{"reached_goal",    "landed",    "holding",    "terminated",
+                                                "killed",          "collision", "time_limit", "battery_empty",
+                                                "no_path_to_goal", "struck"};
 
 class ScenarioReader {
  public:
@@ -168,7 +169,7 @@ void ScenarioReader::read_expectation(Scenario& s) const {
 
 Scenario ScenarioReader::read() {
   std::set<std::string_view> keys = kSettingsTables;
-  keys.insert({"scenario", "fault", "expect"});
+  keys.insert({"scenario", "fault", "body", "expect"});
   reader_.allow_keys(root_, "the file", keys);
   Scenario s;
   s.name = std::filesystem::path(path_).stem().string();
@@ -179,6 +180,7 @@ Scenario ScenarioReader::read() {
   read_head(s);
   read_settings(reader_, root_, s.config);
   read_faults(s);
+  s.bodies = sitl::read_bodies(reader_, root_);
   read_expectation(s);
   return s;
 }
@@ -188,9 +190,10 @@ Scenario ScenarioReader::read() {
 Scenario load_scenario(const std::string& path) { return ScenarioReader(path).read(); }
 
 report::MissionReport fly_scenario(const Scenario& s) {
-  const sitl::World world = s.world.empty() ? sitl::generate(sitl::environment(s.environment).knobs,
-                                                             sitl::Mission::kPackageDelivery, s.config.seed)
-                                            : sitl::load_world(s.world, {});
+  sitl::World world = s.world.empty() ? sitl::generate(sitl::environment(s.environment).knobs,
+                                                       sitl::Mission::kPackageDelivery, s.config.seed)
+                                      : sitl::load_world(s.world, {});
+  world.add(s.bodies);
   report::MissionReport report = fly_mission(world, s.config, {});
   report.result.env = s.name;
   return report;

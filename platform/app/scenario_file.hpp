@@ -28,6 +28,7 @@ struct Scenario {
   std::string about;  ///< One line.
   std::string world;  ///< Path of a world file, or empty: `environment`.
   std::string environment;
+  std::vector<sitl::Body> bodies;  ///< Besides those of the world.
   MissionConfig config{};
   Expectation expect{};
 };
@@ -35,8 +36,8 @@ struct Scenario {
 /// Tables [scenario] about, world (relative to this file) or environment, seed, design, answers, cost_factor
 /// (of computing, against the paper's machine); those of a
 /// settings file (settings_file.hpp); any number of [[fault]] with component, kind, instance, phase, at_s,
-/// for_s; [expect] with the fields above. Throws sitl::InputError with file, line, key and what would be
-/// right.
+/// for_s; [[body]] as in a world file (body_reader.hpp); [expect] with the fields above. Throws
+/// sitl::InputError with file, line, key and what would be right.
 [[nodiscard]] Scenario load_scenario(const std::string& path);
 /// Flies it. Throws sitl::InputError for a world that cannot be flown.
 [[nodiscard]] report::MissionReport fly_scenario(const Scenario& scenario);

@@ -244,36 +244,32 @@ Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, c
     out = Trajectory::hold(start.p_W, start_time);
     return Status::kOk;
   }
-  // From the full state if that stays within the limit; otherwise with a step in jerk, at last in
-  // acceleration: the vehicle follows such a reference with a small error, and a wild one not at all.
-  Trajectory best;
-  double best_mps2 = 1e300;
-  const double limit_mps2 = limits.acceleration_mps2 * kLimitTolerance;
-  TrajectoryPoint from = start;
-  for (int attempt = 0; attempt < 3 && best_mps2 > limit_mps2; ++attempt) {
-    if (attempt >= 1) from.j_W.setZero();
-    if (attempt >= 2) from.a_W.setZero();
-    Trajectory candidate;
-    candidate.start_time = start_time;
-    Plan plan;
-    plan.count = 2;
-    plan.knot_W[0] = from.p_W;
-    double time_s = std::max(1.2 * speed_mps / limits.acceleration_mps2, 0.3);
-    for (int round = 0; round < 8; ++round, time_s *= 1.15) {
-      plan.knot_W[1] = from.p_W + 0.5 * time_s * from.v_W + (time_s * time_s / 12.0) * from.a_W;
-      plan.time_s[1] = time_s;
-      if (!solve(plan, from, candidate)) continue;
-      double worst_mps2 = 0.0;
-      for (int i = 0; i < 2 * kSamples; ++i)
-        worst_mps2 = std::max(worst_mps2, candidate.at_s(time_s * i / (2.0 * kSamples)).a_W.norm());
-      if (worst_mps2 >= best_mps2) continue;
-      best_mps2 = worst_mps2;
-      best = candidate;
-      if (worst_mps2 <= limit_mps2) break;
-    }
+  // Acceleration goes straight to its limit against the motion, stays there, and goes straight to zero.
+  const double ramp_in_s = (start.a_W.norm() + limits.acceleration_mps2) / kJerk_mps3;
+  const double ramp_out_s = limits.acceleration_mps2 / kJerk_mps3;
+  const Vector3 to_lose = start.v_W + 0.5 * ramp_in_s * start.a_W;
+  const double ramps_s = 0.5 * (ramp_in_s + ramp_out_s);
+  const double braking_mps2 = std::min(limits.acceleration_mps2, to_lose.norm() / ramps_s);
+  const double hold_s = std::max(to_lose.norm() / limits.acceleration_mps2 - ramps_s, 0.0);
+  const Vector3 a_W = braking_mps2 > 0.0 ? Vector3(-braking_mps2 * to_lose.normalized()) : Vector3::Zero();
+  const Vector3 none = Vector3::Zero();
+  Trajectory stop;
+  stop.start_time = start_time;
+  TrajectoryPoint at = start;
+  for (const auto& [time_s, end_a_W] :
+       {std::pair{ramp_in_s, a_W}, std::pair{hold_s, a_W}, std::pair{ramp_out_s, none}}) {
+    PolynomialSegment& segment = stop.segment[stop.segment_count++];
+    const Vector3 jerk = time_s > 0.0 ? Vector3((end_a_W - at.a_W) / time_s) : none;
+    segment.duration_s = time_s;
+    segment.coefficient[0] = at.p_W;
+    segment.coefficient[1] = at.v_W;
+    segment.coefficient[2] = 0.5 * at.a_W;
+    segment.coefficient[3] = jerk / 6.0;
+    at.p_W += time_s * (at.v_W + time_s * (0.5 * at.a_W + time_s / 6.0 * jerk));
+    at.v_W += time_s * (at.a_W + 0.5 * time_s * jerk);
+    at.a_W = end_a_W;
   }
-  best.brake_begin_s = 0.0;
-  out = best;
+  out = stop;
   return Status::kOk;
 }
 

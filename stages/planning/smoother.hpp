@@ -45,7 +45,8 @@ class Smoother {
   [[nodiscard]] Status smooth(const SmoothRequest& request, const MapView& view, core::StageBudget& budget,
                               SmoothResult& result) noexcept;
 
-  /// The shortest stop along the present velocity within the acceleration limit, or a hold at rest.
+  /// The shortest stop along the present velocity within the limits of acceleration and jerk (20 m/s3), or a
+  /// hold at rest. Three segments, continuous up to acceleration: to the limit, at the limit, to zero.
   /// kInvalidArgument: not finite or speed above 50 m/s; `out` untouched. RT-safe: O(1).
   [[nodiscard]] Status brake(const TrajectoryPoint& start, MonotonicTime start_time,
                              const MotionLimits& limits, Trajectory& out) const noexcept;

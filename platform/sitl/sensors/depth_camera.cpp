@@ -65,7 +65,7 @@ void SimulatedDepthCamera::render(const Exposure& e) noexcept {
   for (std::size_t i = 0; i < ray_C_.size(); ++i) {
     const double length = ray_C_[i].norm();
     const Vector3 direction_W = (e.X_WC.R_RT * ray_C_[i]) / length;
-    double depth_m = world_.hit_distance_m(origin_W, direction_W, config_.range_m * length) / length;
+    double depth_m = world_.hit_distance_m(origin_W, direction_W, config_.range_m * length, e.stamp) / length;
     const std::uint64_t bits = rng.next();
     if (static_cast<double>(bits >> 40U) * 0x1.0p-24 < config_.pixel_dropout_ratio) {
       depth_m = std::numeric_limits<double>::quiet_NaN();

@@ -70,12 +70,37 @@ double box_distance_m(const Aabb& box, const Vector3& p) noexcept {
   return (p - p.cwiseMax(box.min_W).cwiseMin(box.max_W)).norm();
 }
 
+Pillar cylinder_of(const Body& body, const Vector3& center_W) noexcept {
+  const double half_m = 0.5 * body.height_m;
+  return {center_W.x(), center_W.y(), body.radius_m, center_W.z() - half_m, center_W.z() + half_m};
+}
+
+double hit_sphere_m(const Vector3& center_W, double radius_m, const Vector3& o, const Vector3& d) noexcept {
+  const Vector3 to_center = center_W - o;
+  const double along_m = to_center.dot(d);
+  const double c = to_center.squaredNorm() - radius_m * radius_m;
+  const double discriminant = along_m * along_m - c;
+  if (c <= 0.0) return 0.0;
+  return discriminant < 0.0 || along_m < 0.0 ? kInfinity : along_m - std::sqrt(discriminant);
+}
+
 Aabb extent_of(const Pillar& p) noexcept {
   return {Vector3(p.x_m - p.radius_m, p.y_m - p.radius_m, p.bottom_m),
           Vector3(p.x_m + p.radius_m, p.y_m + p.radius_m, p.top_m)};
 }
 
 }  // namespace
+
+Vector3 Body::center_W(MonotonicTime when) const noexcept {
+  double left_m = std::max(seconds(when.time_since_epoch()) - start_s, 0.0) * speed_mps;
+  for (std::size_t i = 1; i < path_W.size(); ++i) {
+    const Vector3 way = path_W[i] - path_W[i - 1];
+    const double length_m = way.norm();
+    if (left_m < length_m) return path_W[i - 1] + (left_m / length_m) * way;
+    left_m -= length_m;
+  }
+  return path_W.back();
+}
 
 World::World(WorldDescription description) : description_(std::move(description)) {
   const Aabb& b = description_.bounds_W;
@@ -195,6 +220,38 @@ double World::clearance_m(const Vector3& p_W, double cap_m) const noexcept {
     }
   }
   return best_m;
+}
+
+void World::add(const std::vector<Body>& bodies) {
+  description_.bodies.insert(description_.bodies.end(), bodies.begin(), bodies.end());
+}
+
+double World::hit_distance_m(const Vector3& origin_W, const Vector3& direction_W, double max_m,
+                             MonotonicTime when) const noexcept {
+  double best_m = hit_distance_m(origin_W, direction_W, max_m);
+  for (const Body& body : description_.bodies) {
+    const Vector3 center_W = body.center_W(when);
+    const double hit_m = body.height_m > 0.0
+                             ? hit_pillar_m(cylinder_of(body, center_W), origin_W, direction_W)
+                             : hit_sphere_m(center_W, body.radius_m, origin_W, direction_W);
+    if (hit_m <= max_m) best_m = std::min(best_m, hit_m);
+  }
+  return best_m;
+}
+
+std::optional<World::NearestBody> World::nearest_body(const Vector3& p_W, double cap_m,
+                                                      MonotonicTime when) const noexcept {
+  std::optional<NearestBody> nearest;
+  for (const Body& body : description_.bodies) {
+    Vector3 core_W = body.center_W(when);
+    const double distance_m = body.height_m > 0.0 ? pillar_distance_m(cylinder_of(body, core_W), p_W)
+                                                  : std::max((p_W - core_W).norm() - body.radius_m, 0.0);
+    if (distance_m >= (nearest ? nearest->distance_m : cap_m)) continue;
+    const double half_m = 0.5 * body.height_m;
+    core_W.z() = std::clamp(p_W.z(), core_W.z() - half_m, core_W.z() + half_m);
+    nearest = {distance_m, core_W};
+  }
+  return nearest;
 }
 
 double World::congestion_ratio(double x_m, double y_m) const noexcept {

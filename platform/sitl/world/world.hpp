@@ -1,11 +1,14 @@
-/// The true world: what the cameras see and what the vehicle can hit. Immutable once made.
+/// The true world: what the cameras see and what the vehicle can hit. What moves in it is a function of time
+/// alone.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "core/geometry/vector.hpp"
+#include "firmware_if/time.hpp"
 #include "platform/sitl/world/voxel_grid.hpp"
 
 namespace roborun::sitl {
@@ -19,6 +22,18 @@ struct Pillar {
   double top_m{20.0};
 };
 
+/// A sphere, or an upright cylinder, that goes along its way-points at a constant speed and stays at the
+/// last.
+struct Body {
+  double radius_m{};
+  double height_m{0.0};  ///< Of the cylinder; 0: a sphere.
+  double speed_mps{};
+  double start_s{0.0};          ///< It waits at its first way-point until then, counted from time zero.
+  std::vector<Vector3> path_W;  ///< Of its centre; at least one point.
+
+  [[nodiscard]] Vector3 center_W(MonotonicTime when) const noexcept;
+};
+
 /// Everything a world is made of. The ground is the plane z = 0.
 struct WorldDescription {
   Aabb bounds_W{};  ///< Where the vehicle's centre may be.
@@ -27,6 +42,7 @@ struct WorldDescription {
   std::vector<Pillar> pillars;
   std::vector<Aabb> boxes;
   VoxelGrid voxels;
+  std::vector<Body> bodies;
 };
 
 class World {
@@ -41,13 +57,26 @@ class World {
   [[nodiscard]] const std::vector<Pillar>& pillars() const noexcept { return description_.pillars; }
   [[nodiscard]] const std::vector<Aabb>& boxes() const noexcept { return description_.boxes; }
   [[nodiscard]] const VoxelGrid& voxels() const noexcept { return description_.voxels; }
+  [[nodiscard]] const std::vector<Body>& bodies() const noexcept { return description_.bodies; }
+  void add(const std::vector<Body>& bodies);
 
-  /// Distance along a unit direction to the first surface (obstacle or ground), +infinity if none within
-  /// max_m.
+  /// Distance along a unit direction to the first surface (obstacle or ground) of what does not move,
+  /// +infinity if none within max_m.
   [[nodiscard]] double hit_distance_m(const Vector3& origin_W, const Vector3& direction_W,
                                       double max_m) const noexcept;
-  /// Distance from a point to the nearest obstacle (the ground is none), at most cap_m; 0 inside an obstacle.
+  /// The same with the bodies where they are at `when`.
+  [[nodiscard]] double hit_distance_m(const Vector3& origin_W, const Vector3& direction_W, double max_m,
+                                      MonotonicTime when) const noexcept;
+  /// Distance from a point to the nearest obstacle that does not move (the ground is none), at most cap_m; 0
+  /// inside an obstacle.
   [[nodiscard]] double clearance_m(const Vector3& p_W, double cap_m) const noexcept;
+  struct NearestBody {
+    double distance_m{};               ///< To its surface; 0 inside.
+    Vector3 core_W = Vector3::Zero();  ///< The nearest point of its axis, or its centre.
+  };
+  /// The body nearest to the point at `when`, if one is nearer than cap_m.
+  [[nodiscard]] std::optional<NearestBody> nearest_body(const Vector3& p_W, double cap_m,
+                                                        MonotonicTime when) const noexcept;
   /// Share of 10 m cells within 30 m of (x, y) with an obstacle no farther from their centre than their
   /// corners, 0 .. 1: the colour of the heat map.
   [[nodiscard]] double congestion_ratio(double x_m, double y_m) const noexcept;

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "platform/sitl/world/body_reader.hpp"
 #include "platform/sitl/world/input_error.hpp"
 #include "platform/sitl/world/octomap_file.hpp"
 #include "platform/sitl/world/toml_reader.hpp"
@@ -76,7 +77,7 @@ WorldDescription read_toml(const std::string& path, const std::vector<unsigned c
                            const Endpoints& endpoints) {
   const toml::table root = parse_toml(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   const TomlReader reader(path);
-  reader.allow_keys(root, "the file", {"world", "pillar", "box"});
+  reader.allow_keys(root, "the file", {"world", "pillar", "box", "body"});
   const toml::table* table = reader.need(root, "world", "the file").as_table();
   if (table == nullptr) reader.refuse(root, "world", "must be a table: [world]");
   reader.allow_keys(*table, "[world]", {"bounds", "start", "goal"});
@@ -93,6 +94,7 @@ WorldDescription read_toml(const std::string& path, const std::vector<unsigned c
       endpoints.goal_W ? *endpoints.goal_W : reader.point(reader.need(*table, "goal", "[world]"), "goal");
   read_pillars(reader, root, world);
   read_boxes(reader, root, world);
+  world.bodies = read_bodies(reader, root);
   return world;
 }
 

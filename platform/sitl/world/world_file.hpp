@@ -23,7 +23,8 @@ struct Endpoints {
 /// TOML: tables [world] with bounds = [[x, y, z], [x, y, z]], start = [x, y, z], goal = [x, y, z], and any
 /// number of
 ///   [[pillar]] with x, y, radius, optional bottom (0) and top (20), and [[box]] with min = [x, y, z], max =
-///   [x, y, z]; metres, at most 100,000 objects.
+///   [x, y, z]; metres, at most 100,000 objects; and [[body]], which moves
+///   (body_reader.hpp).
 /// OctoMap: every leaf that its log-odds call occupied becomes solid; the bounds are the box around all
 /// leaves, from
 ///   0.5 m above its floor; start and goal default to the free-most points near the two ends of the longer

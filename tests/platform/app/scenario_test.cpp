@@ -19,7 +19,9 @@ TEST(ScenarioFile, ReadsEveryTable) {
       "all.toml", kHead + "seed = 7\nanswers = false\n[camera]\npixels = 48\n[fog]\nvisibility_m = 9\n" +
                       "[fence]\naltitude_m = [1, 9]\nkeep_out = [{ circle = [5, 5, 2] }]\n" +
                       "[[fault]]\ncomponent = \"esc\"\nkind = \"off\"\ninstance = 3\nphase = \"return\"\n" +
-                      "at_s = 1.5\nfor_s = 2\n[[fault]]\ncomponent = \"wind\"\nkind = \"on\"\n" + kTail +
+                      "at_s = 1.5\nfor_s = 2\n[[body]]\nradius = 1\nspeed = 3\npath = [[1, 2, 3], [4, 5, "
+                      "6]]\n[[fault]]\ncomponent = \"wind\"\nkind = \"on\"\n" +
+                      kTail +
                       "action = \"land\"\ncondition = \"gnss\"\nwithin_s = 2\nlanding_site_known = true\n"));
   EXPECT_EQ(s.name, "all");
   EXPECT_EQ(s.config.seed, 7U);
@@ -36,6 +38,8 @@ TEST(ScenarioFile, ReadsEveryTable) {
   EXPECT_EQ(s.config.faults[0].at_s, 1.5);
   EXPECT_EQ(s.config.faults[0].for_s, 2.0);
   EXPECT_FALSE(s.config.faults[1].phase.has_value());
+  ASSERT_EQ(s.bodies.size(), 1U);
+  EXPECT_EQ(s.bodies[0].speed_mps, 3.0);
   EXPECT_EQ(s.expect.action, "land");
   EXPECT_EQ(s.expect.condition, "gnss");
   EXPECT_EQ(s.expect.landing_site_known, true);
@@ -61,6 +65,7 @@ TEST(ScenarioFile, RefusesWithFileLineKeyAndWhatWouldBeRight) {
       {fault + "component = \"esc\"\nkind = \"off\"\nat_s = -1\n" + kTail,
        ":7: at_s: must be a number from 0"},
       {fault + "kind = \"off\"\n" + kTail, ":4: component: missing in [[fault]]"},
+      {kHead + "[[body]]\nradius = -1\npath = [[0, 0, 0]]\n" + kTail, ":5: radius: must be a number from 0"},
       {kHead + "[fence]\nkeep_in = [{ polygon = [] }]\n" + kTail,
        ":5: polygon: must have at least three points"},
       {kHead + "[fence]\nkeep_in = [{ polygon = [[1, 1]] }]\n" + kTail,

@@ -240,11 +240,14 @@ TEST(Smoother, BrakesWithinTheLimit) {
     Trajectory t;
     ASSERT_EQ(sut.brake(start, {}, {6.0, 4.0}, t), Status::kOk);
     const double v = start.v_W.norm();
-    EXPECT_LT(t.duration_s(), 1.2 * v / 4.0 * 3.0 + 1.0);
-    EXPECT_LT((t.end_W() - start.p_W).norm(), v * v / 2.0 + 2.0) << "no wild swing";
+    // 4 m/s2 all the time, and half of the two ramps before it does what it can.
+    EXPECT_LT(t.duration_s(), (v + 0.5) / 4.0 + 0.6);
+    EXPECT_LT((t.end_W() - start.p_W).norm(), v * v / 8.0 + 0.4 * v + 0.5);
+    EXPECT_LT(t.at_s(t.duration_s() * (1.0 - 1e-12)).v_W.norm(), 1e-6);
     for (double s = 0.0; s < t.duration_s(); s += 0.01) {
-      ASSERT_LE(t.at_s(s).v_W.norm(), v * 1.3 + 0.6);
-      ASSERT_LE(t.at_s(s).a_W.norm(), 12.0);
+      ASSERT_LE(t.at_s(s).v_W.norm(), v + 0.6);
+      ASSERT_LE(t.at_s(s).a_W.norm(), 4.0 + 1e-9);
+      ASSERT_LE(t.at_s(s).j_W.norm(), 20.0 + 1e-9);
     }
   }
   Trajectory t;

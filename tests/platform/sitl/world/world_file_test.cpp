@@ -41,6 +41,19 @@ TEST_F(WorldFile, ReadsPillarsBoxesBoundsAndEnds) {
   EXPECT_EQ(world.bounds_W().max_W, Vector3(80.0, 20.0, 10.0));
 }
 
+TEST_F(WorldFile, ReadsMovingBodies) {
+  const World world = load_world(
+      write(good_ +
+            "[[body]]\nradius = 0.5\nheight = 3\nspeed = 2\nat_s = 4\npath = [[9, 9, 2], [9, -9, 2]]\n"
+            "[[body]]\nradius = 1\npath = [[50, 0, 5]]\n"),
+      {});
+  ASSERT_EQ(world.bodies().size(), 2U);
+  EXPECT_EQ(world.bodies()[0].height_m, 3.0);
+  EXPECT_EQ(world.bodies()[0].start_s, 4.0);
+  EXPECT_EQ(world.bodies()[0].path_W[1], Vector3(9, -9, 2));
+  EXPECT_EQ(world.bodies()[1].speed_mps, 0.0);
+}
+
 TEST_F(WorldFile, OtherEndsMayBeAskedFor) {
   const World world = load_world(write(good_), {Vector3(6.0, 1.0, 4.0), std::nullopt});
   EXPECT_EQ(world.start_W(), Vector3(6.0, 1.0, 4.0));
@@ -70,6 +83,14 @@ TEST_F(WorldFile, RefusesInOneLineThatNamesFileLineAndKey) {
       {replaced("goal = [75, 0, 5]", "goal = [175, 0, 5]"), "goal"},
       {replaced("goal = [75, 0, 5]", "goal = [40, 0, 5]"), "closer than 0.6 m to an obstacle"},
       {replaced("max = [22", "max = [12"), "max: must be above min on every axis"},
+      {good_ + "[[body]]\npath = [[0, 0, 1]]\n", ":12: radius: missing in [[body]]"},
+      {good_ + "[[body]]\nradius = 0\npath = [[0, 0, 1]]\n", ":13: radius: must be above 0"},
+      {good_ + "[[body]]\nradius = 1\nspeed = -1\npath = [[0, 0, 1]]\n",
+       ":14: speed: must be a number from 0"},
+      {good_ + "[[body]]\nradius = 1\npath = []\n", ":14: path: must be one to 1000 points"},
+      {good_ + "[[body]]\nradius = 1\npath = [[0, 0]]\n", ":14: path: must be three numbers"},
+      {good_ + "[[body]]\nradius = 1\nspeeed = 2\n", ":14: speeed: unknown key in [[body]]"},
+      {good_ + "[body]\nradius = 1\n", "body: must be written as [[body]]"},
       {replaced("[world]", "[word]"), "word: unknown key in the file"},
       {replaced("[world]", "[world"), "world.toml"},
       {"", "world: missing in the file"},

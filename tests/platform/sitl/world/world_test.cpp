@@ -43,6 +43,36 @@ TEST(World, ClearanceIsZeroInsideAndTheDistanceOutside) {
   EXPECT_NEAR(world.clearance_m({10.0, 0.0, 23.0}, 10.0), 3.0, 1e-9) << "above its top";
 }
 
+TEST(MovingBody, GoesAlongItsWayPointsAndStaysAtTheLast) {
+  Body body{0.5, 0.0, 2.0, 3.0, {{0, 0, 4}, {4, 0, 4}, {4, 6, 4}}};
+  const auto at = [&body](double time_s) { return body.center_W(MonotonicTime{from_seconds(time_s)}); };
+  EXPECT_EQ(at(0.0), Vector3(0, 0, 4));
+  EXPECT_EQ(at(3.0), Vector3(0, 0, 4)) << "it waits until then";
+  EXPECT_NEAR((at(4.0) - Vector3(2, 0, 4)).norm(), 0.0, 1e-9);
+  EXPECT_NEAR((at(6.0) - Vector3(4, 2, 4)).norm(), 0.0, 1e-9) << "round the corner";
+  EXPECT_EQ(at(100.0), Vector3(4, 6, 4));
+}
+
+TEST(MovingBody, IsSeenAndMeasuredWhereItIsAtThatInstant) {
+  WorldDescription d = empty_world();
+  d.bodies = {{1.0, 0.0, 1.0, 0.0, {{10, 0, 5}, {10, 20, 5}}}, {2.0, 4.0, 1.0, 0.0, {{20, 0, 5}}}};
+  const World world(d);
+  const MonotonicTime begin{};
+  const MonotonicTime later{from_seconds(10.0)};
+  const Vector3 eye_W(0, 0, 5);
+  EXPECT_NEAR(world.hit_distance_m(eye_W, Vector3::UnitX(), 50.0, begin), 9.0, 1e-9) << "the sphere";
+  EXPECT_NEAR(world.hit_distance_m(eye_W, Vector3::UnitX(), 50.0, later), 18.0, 1e-9) << "the cylinder";
+  EXPECT_TRUE(std::isinf(world.hit_distance_m(eye_W, -Vector3::UnitX(), 50.0, begin))) << "behind";
+  EXPECT_TRUE(std::isinf(world.hit_distance_m(eye_W, Vector3::UnitX(), 8.9, begin))) << "out of reach";
+  EXPECT_TRUE(std::isinf(world.hit_distance_m(eye_W, Vector3::UnitX(), 50.0))) << "nothing that stands";
+  const auto nearest = world.nearest_body({20, 0, 8.5}, 5.0, later);
+  ASSERT_TRUE(nearest.has_value());
+  EXPECT_NEAR(nearest->distance_m, 1.5, 1e-9) << "over its top";
+  EXPECT_NEAR((nearest->core_W - Vector3(20, 0, 7)).norm(), 0.0, 1e-9);
+  EXPECT_NEAR(world.nearest_body({10, 7, 5}, 5.0, later)->distance_m, 2.0, 1e-9);
+  EXPECT_FALSE(world.nearest_body({10, 0, 5}, 5.0, later).has_value()) << "it went away";
+}
+
 TEST(World, TheSearchGridAgreesWithAWalkOverEverything) {
   WorldDescription d = empty_world();
   core::CounterRng rng(5);

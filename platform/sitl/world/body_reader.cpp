@@ -1,0 +1,44 @@
+#include "platform/sitl/world/body_reader.hpp"
+
+namespace roborun::sitl {
+namespace {
+
+constexpr std::size_t kMost = 1000;
+
+double number_within(const TomlReader& reader, const toml::table& table, const char* key, double fallback,
+                     double high) {
+  const double value = reader.number_or(table, key, fallback);
+  if (!(value >= 0.0 && value <= high))
+    reader.refuse(*table.get(key), key, fmt::format("must be a number from 0 to {}", high));
+  return value;
+}
+
+}  // namespace
+
+std::vector<Body> read_bodies(const TomlReader& reader, const toml::table& root) {
+  std::vector<Body> bodies;
+  const toml::node* list = root.get("body");
+  if (list == nullptr) return bodies;
+  if (list->as_array() == nullptr) reader.refuse(*list, "body", "must be written as [[body]]");
+  for (const toml::node& node : *list->as_array()) {
+    const toml::table* table = node.as_table();
+    if (table == nullptr) reader.refuse(node, "body", "must be written as [[body]]");
+    reader.allow_keys(*table, "[[body]]", {"radius", "height", "speed", "at_s", "path"});
+    Body body;
+    const toml::node& radius = reader.need(*table, "radius", "[[body]]");
+    body.radius_m = number_within(reader, *table, "radius", 0.0, 100.0);
+    if (!(body.radius_m > 0.0)) reader.refuse(radius, "radius", "must be above 0");
+    body.height_m = number_within(reader, *table, "height", 0.0, 1000.0);
+    body.speed_mps = number_within(reader, *table, "speed", 0.0, 50.0);
+    body.start_s = number_within(reader, *table, "at_s", 0.0, 7200.0);
+    const toml::node& path = reader.need(*table, "path", "[[body]]");
+    if (path.as_array() == nullptr || path.as_array()->empty() || path.as_array()->size() > kMost)
+      reader.refuse(path, "path", "must be one to 1000 points: [[x, y, z], ...]");
+    for (const toml::node& point : *path.as_array()) body.path_W.push_back(reader.point(point, "path"));
+    if (bodies.size() == kMost) reader.refuse(node, "body", "more than 1000 bodies");
+    bodies.push_back(std::move(body));
+  }
+  return bodies;
+}
+
+}  // namespace roborun::sitl
