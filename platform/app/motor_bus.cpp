@@ -24,11 +24,4 @@ firmware_if::CanBus& KernelMotorBus::esc(std::size_t index) noexcept {
   return esc_[index];
 }
 
-const sitl::CommandMeter& KernelMotorBus::meter() noexcept {
-  firmware_if::CanFrame frame;
-  while (first_esc_.receive(frame) == Status::kOk) {
-  }
-  return meter_;
-}
-
 }  // namespace roborun::app

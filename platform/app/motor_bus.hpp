@@ -34,8 +34,7 @@ class KernelMotorBus final : public MotorBus {
 
   [[nodiscard]] firmware_if::CanBus& node() noexcept override { return node_; }
   [[nodiscard]] firmware_if::CanBus& esc(std::size_t index) noexcept override;
-  /// After a run: hears what came since the first ESC last listened.
-  [[nodiscard]] const sitl::CommandMeter& meter() noexcept;
+  [[nodiscard]] const sitl::CommandMeter& meter() const noexcept { return meter_; }
 
  private:
   sitl::CommandMeter meter_;

@@ -250,6 +250,7 @@ void RealTimeRun::fill_commands(report::AuditReport& report) const {
   path.sent = meter.sent();
   path.refused = aircraft_.actuators().node().counters().commands_refused;
   path.heard = meter.heard();
+  path.lost = meter.lost();
   path.late = meter.late();
   path.age = report::summarise(meter.age());
   path.gap = report::summarise(meter.gap());

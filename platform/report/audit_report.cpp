@@ -120,8 +120,8 @@ std::string to_json(const AuditReport& r) {
   j["stopped_by"] = r.stopped_by;
   if (r.commands) {
     const CommandPath& c = *r.commands;
-    j["commands"] = {{"interfaces", c.interfaces}, {"sent", c.sent},           {"refused", c.refused},
-                     {"heard", c.heard},           {"lost", c.sent - c.heard}, {"late", c.late},
+    j["commands"] = {{"interfaces", c.interfaces}, {"sent", c.sent},         {"refused", c.refused},
+                     {"heard", c.heard},           {"lost", c.lost},         {"late", c.late},
                      {"age_us", timing(c.age)},    {"gap_us", timing(c.gap)}};
   }
   j["lanes"] = Json::array();
@@ -178,8 +178,8 @@ std::string audit_table(const AuditReport& r) {
         "commands from {} to {}: {} sent, {} refused, {} lost, {} late; age p50 / p99.9 / max {:.0f} / "
         "{:.0f} / {:.0f} us; "
         "longest gap {:.0f} us\n",
-        c.interfaces[0], c.interfaces[1], c.sent, c.refused, c.sent - c.heard, c.late, c.age.median_us,
-        c.age.p999_us, c.age.max_us, c.gap.max_us);
+        c.interfaces[0], c.interfaces[1], c.sent, c.refused, c.lost, c.late, c.age.median_us, c.age.p999_us,
+        c.age.max_us, c.gap.max_us);
   }
   for (const auto& [name, count] : r.heap_sites) text += fmt::format("  heap: {} x {}\n", count, name);
   if (r.decision_stalls > 0)

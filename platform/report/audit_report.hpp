@@ -51,10 +51,10 @@ struct AuditTraceEvent {
   bool overrun{};
 };
 
-/// How throttles reached the ESCs over a real bus. What was sent and not heard is lost.
+/// How throttles reached the ESCs over a real bus. The last of those sent may be neither heard nor lost.
 struct CommandPath {
   std::array<std::string, 2> interfaces;  ///< The vehicle's, the ESCs'.
-  std::uint64_t sent{}, refused{}, heard{};
+  std::uint64_t sent{}, refused{}, heard{}, lost{};
   std::uint64_t late{};  ///< Older than a minor frame when they came.
   TimingSummary age;     ///< From the minor frame that made them to the ESCs.
   TimingSummary gap;     ///< Between two at the ESCs.

@@ -22,16 +22,22 @@ std::size_t transfer_id(const firmware_if::CanFrame& frame) noexcept {
 void CommandMeter::sent(const firmware_if::CanFrame& frame) noexcept {
   if (!is_command(frame)) return;
   const std::size_t id = transfer_id(frame);
+  if (on_its_way_[id] != 0) ++lost_;
   made_[id] = frame.stamp;
-  on_its_way_[id] = true;
-  ++sent_;
+  on_its_way_[id] = ++sent_;
 }
 
 void CommandMeter::heard(const firmware_if::CanFrame& frame) noexcept {
   if (!is_command(frame)) return;
   const std::size_t id = transfer_id(frame);
-  if (!on_its_way_[id]) return;
-  on_its_way_[id] = false;
+  if (on_its_way_[id] == 0) return;
+  // A bus keeps the order of one sender's frames: what was sent before this one and is not here never comes.
+  for (std::uint64_t& other : on_its_way_) {
+    if (other == 0 || other >= on_its_way_[id]) continue;
+    ++lost_;
+    other = 0;
+  }
+  on_its_way_[id] = 0;
   const Nanos age = frame.stamp - made_[id];
   age_.add(age);
   if (age > late_after_) ++late_;

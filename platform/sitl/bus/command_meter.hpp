@@ -20,9 +20,11 @@ class CommandMeter {
   void sent(const firmware_if::CanFrame& frame) noexcept;
   void heard(const firmware_if::CanFrame& frame) noexcept;
 
-  /// Never decrease. What was sent and not heard is lost, or still on its way.
+  /// Never decrease. Lost: one that was sent later was heard first, or 32 were sent since. The rest of those
+  /// sent is on its way.
   [[nodiscard]] std::uint64_t sent() const noexcept { return sent_; }
   [[nodiscard]] std::uint64_t heard() const noexcept { return heard_; }
+  [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
   [[nodiscard]] std::uint64_t late() const noexcept { return late_; }
   /// From the stamp of the sender (when the content was made) to that of the receiver (end of frame).
   [[nodiscard]] const core::DurationHistogram& age() const noexcept { return age_; }
@@ -32,9 +34,9 @@ class CommandMeter {
  private:
   Nanos late_after_;
   std::array<MonotonicTime, 32> made_{};
-  std::array<bool, 32> on_its_way_{};
+  std::array<std::uint64_t, 32> on_its_way_{};  ///< As the how manieth it was sent; 0: it is not.
   MonotonicTime last_heard_{};
-  std::uint64_t sent_{0}, heard_{0}, late_{0};
+  std::uint64_t sent_{0}, heard_{0}, lost_{0}, late_{0};
   core::DurationHistogram age_{}, gap_{};
 };
 

@@ -144,7 +144,8 @@ TEST(AuditReport, TellsHowCommandsReachedTheEscsOverARealBusAndOnlyThen) {
   CommandPath& path = r.commands.emplace();
   path.interfaces = {"can0", "can1"};
   path.sent = 1000;
-  path.heard = 997;
+  path.heard = 996;
+  path.lost = 3;
   path.late = 2;
   path.age.max_us = 1234.0;
   const Json commands = Json::parse(to_json(r)).at("commands");

@@ -52,6 +52,7 @@ TEST_F(CommandMeterTest, PairsWhatWasSentWithWhatWasHeard) {
   }
   EXPECT_EQ(sut.sent(), 1000U) << "and no NodeStatus";
   EXPECT_EQ(sut.heard(), 1000U);
+  EXPECT_EQ(sut.lost(), 0U);
   EXPECT_EQ(sut.late(), 0U);
   // 7 bytes of throttles and the tail byte: 131 bits at 1 Mbit/s.
   EXPECT_EQ(sut.age().min(), Nanos{131'000});
@@ -69,6 +70,7 @@ TEST_F(CommandMeterTest, CountsWhatTheBusLostAndTheGapItLeft) {
   }
   EXPECT_EQ(sut.sent(), 1000U);
   EXPECT_EQ(sut.heard(), 800U);
+  EXPECT_EQ(sut.lost(), 200U);
   EXPECT_EQ(sut.gap().max(), 3 * kFrame);
 }
 
@@ -87,6 +89,17 @@ TEST_F(CommandMeterTest, CountsARepetitionOnce) {
   listen(MonotonicTime{kFrame});
   EXPECT_EQ(esc.counters().received, 2U);
   EXPECT_EQ(sut.heard(), 1U);
+}
+
+TEST_F(CommandMeterTest, CountsAsLostWhatADeadBusSwallowed) {
+  bus.set_faults({.loss_ratio = 1.0});
+  MonotonicTime now{};
+  for (int i = 0; i < 100; ++i, now += kFrame) {
+    command(now);
+    listen(now + kFrame);
+  }
+  EXPECT_EQ(sut.heard(), 0U);
+  EXPECT_EQ(sut.lost(), 68U) << "32 may still come";
 }
 
 }  // namespace
