@@ -68,7 +68,7 @@ Status TransmitGate::send(const dronecan::TransferHeader& header, std::span<cons
   } else if (rule->type.id == dronecan::kType<dronecan::HardpointCommand>.id) {
     dronecan::HardpointCommand command;
     form = dronecan::decode(payload, command);
-    if (form == Status::kOk && command.command == kRelease && !release_allowed_)
+    if (form == Status::kOk && command.command == kRelease && (!release_allowed_ || killed_))
       form = Status::kInvalidArgument;
   }
   if (form != Status::kOk) {

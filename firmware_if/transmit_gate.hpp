@@ -34,7 +34,7 @@ inline constexpr std::array<TransmitRule, 7> kTransmitRules{{
 ///   - one for each ESC, no fewer and no more: any other length is refused;
 ///   - between 0 and `throttle_max`; never reverse;
 ///   - rising at most `rise_per_s`; falling at once.
-/// A package release (hardpoint command 0) leaves only while release_allowed.
+/// A package release (hardpoint command 0) leaves only while release_allowed, and never once killed.
 /// Transfer ids are counted here, so that no caller can repeat one. Not thread-safe: one lane owns it.
 /// RT-safe: O(1), no allocation, does not block.
 class TransmitGate {

@@ -8,17 +8,26 @@ namespace {
 constexpr std::uint32_t kBitrate_bps = 1'000'000;
 constexpr std::uint8_t kFirstEscNode = 21;
 
+firmware_if::CanBus& node_end(sitl::FakeCanPort& simulated, MotorBus* outside) noexcept {
+  if (outside != nullptr) return outside->node();
+  return simulated;
+}
+firmware_if::CanBus& esc_end(sitl::FakeCan& simulated, MotorBus* outside, std::size_t index) noexcept {
+  if (outside != nullptr) return outside->esc(index);
+  return simulated.port(1 + index);
+}
+
 }  // namespace
 
-ActuatorLink::ActuatorLink(std::uint64_t seed, Nanos minor_frame) noexcept
+ActuatorLink::ActuatorLink(std::uint64_t seed, Nanos minor_frame, MotorBus* outside) noexcept
     : bus_(kBitrate_bps, seed),
       port_(bus_.port(0)),
-      gate_({.beat_timeout = 3 * minor_frame}, port_),
-      node_({.command_period = minor_frame}, gate_, port_, sessions_),
-      escs_{{{{.node_id = kFirstEscNode, .index = 0}, bus_.port(1)},
-             {{.node_id = kFirstEscNode + 1, .index = 1}, bus_.port(2)},
-             {{.node_id = kFirstEscNode + 2, .index = 2}, bus_.port(3)},
-             {{.node_id = kFirstEscNode + 3, .index = 3}, bus_.port(4)}}},
+      gate_({.beat_timeout = 3 * minor_frame}, node_end(port_, outside)),
+      node_({.command_period = minor_frame}, gate_, node_end(port_, outside), sessions_),
+      escs_{{{{.node_id = kFirstEscNode, .index = 0}, esc_end(bus_, outside, 0)},
+             {{.node_id = kFirstEscNode + 1, .index = 1}, esc_end(bus_, outside, 1)},
+             {{.node_id = kFirstEscNode + 2, .index = 2}, esc_end(bus_, outside, 2)},
+             {{.node_id = kFirstEscNode + 3, .index = 3}, esc_end(bus_, outside, 3)}}},
       kill_switch_(kill_open_, kill_closed_) {
   kill_closed_.drive(true, {});
 }

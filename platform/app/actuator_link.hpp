@@ -7,6 +7,7 @@
 #include "firmware_if/dronecan/node.hpp"
 #include "firmware_if/kill_switch.hpp"
 #include "firmware_if/motors.hpp"
+#include "platform/app/motor_bus.hpp"
 #include "platform/sitl/bus/fake_can.hpp"
 #include "platform/sitl/bus/fake_esc.hpp"
 #include "platform/sitl/bus/fake_gpio.hpp"
@@ -19,8 +20,9 @@ namespace roborun::app {
 /// simulation. No allocation after construction.
 class ActuatorLink final : public firmware_if::Motors {
  public:
-  /// The gate closes after three minor frames without a command.
-  ActuatorLink(std::uint64_t seed, Nanos minor_frame) noexcept;
+  /// The gate closes after three minor frames without a command. `outside` carries the frames instead of the
+  /// simulated bus (whose faults have no effect then), and must outlive the link; null: none.
+  ActuatorLink(std::uint64_t seed, Nanos minor_frame, MotorBus* outside) noexcept;
   ActuatorLink(const ActuatorLink&) = delete;
   ActuatorLink& operator=(const ActuatorLink&) = delete;
 
@@ -46,7 +48,6 @@ class ActuatorLink final : public firmware_if::Motors {
 
   [[nodiscard]] const firmware_if::dronecan::Node& node() const noexcept { return node_; }
   [[nodiscard]] const firmware_if::TransmitGate& gate() const noexcept { return gate_; }
-  [[nodiscard]] const sitl::FakeCan& bus() const noexcept { return bus_; }
 
  private:
   void break_lines(MonotonicTime now) noexcept;

@@ -11,6 +11,7 @@
 
 #include "platform/app/board_profile.hpp"
 #include "platform/app/real_time_run.hpp"
+#include "platform/app/settings_file.hpp"
 #include "platform/report/trace_csv.hpp"
 #include "platform/sitl/world/generator.hpp"
 #include "platform/sitl/world/input_error.hpp"
@@ -26,6 +27,8 @@ struct Options {
   int rate_Hz{400};
   std::string env{"14"};
   std::uint64_t seed{1};
+  std::string profile{"host"};
+  std::string settings;
   bool load{false};
   bool json{false};
   bool best_effort{false};
@@ -34,6 +37,8 @@ struct Options {
   std::vector<std::string> compare;
   double tolerance_ratio{1.5};
   std::string spin;
+  std::vector<std::string> can;
+  bool props_off{false};
 };
 
 int compare(const Options& options) {
@@ -76,6 +81,8 @@ std::optional<Injection> injection_of(const std::string& text) {
 
 int audit(const Options& options) {
   if (!options.compare.empty()) return compare(options);
+  if (!options.can.empty() && !options.props_off)
+    throw InputError("--can: real ESCs on that bus would turn: take the propellers off and say --props-off");
   if (!(options.seconds >= 1.0 && options.seconds <= 86400.0))
     throw InputError(fmt::format("--seconds: {} is out of range: must be from 1 to 86400", options.seconds));
   if (!core::is_flight_rate(options.rate_Hz))
@@ -85,12 +92,14 @@ int audit(const Options& options) {
                     "320 or 400",
                     options.rate_Hz));
   RealTimeConfig config;
+  if (!options.settings.empty()) load_settings(options.settings, config.mission);
   config.inject = injection_of(options.spin);
   const sitl::NamedEnvironment environment = sitl::environment(options.env);
   const sitl::World world = sitl::generate(environment.knobs, sitl::Mission::kPackageDelivery, options.seed);
   // Last, after everything that may be refused: the first time this measures the machine.
   std::string note;
-  const Profile profile = host(default_host_path({}), {}, 1.0, note);
+  const Profile profile = options.profile == "host" ? host(default_host_path({}), {}, 1.0, note)
+                                                    : load_profile(options.profile, {});
   if (!note.empty()) fmt::print(stderr, "roborun: {}\n", note);
   config.mission.costs = profile.costs;
   config.mission.model = profile.model;
@@ -100,6 +109,7 @@ int audit(const Options& options) {
   config.best_effort = options.best_effort;
   config.load = options.load;
   config.trace = !options.trace.empty();
+  if (!options.can.empty()) config.can = {options.can[0], options.can[1]};
   const bool terminal = isatty(STDERR_FILENO) != 0;
   const report::AuditReport result = run_real_time(world, config, [&](double done_s) {
     if (terminal) fmt::print(stderr, "\raudit {:3.0f} of {:.0f} s   ", done_s, options.seconds);
@@ -142,6 +152,13 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
       ->capture_default_str();
   command->add_option("--seed", options->seed, "Seed of world, noise, wind and planner")
       ->capture_default_str();
+  command
+      ->add_option("--profile", options->profile,
+                   "What the governor expects stages to cost: paper, host (measured once), or a file of "
+                   "roborun calibrate")
+      ->capture_default_str();
+  command->add_option("--settings", options->settings,
+                      "TOML file: cameras, wind, battery, fence (see platform/README.md)");
   command->add_flag("--load", options->load, "With stress-ng on all CPUs meanwhile");
   command->add_flag("--best-effort", options->best_effort,
                     "Where real time is not to be had, run on without, and say so in the report");
@@ -155,6 +172,15 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
       ->add_option("--tolerance", options->tolerance_ratio,
                    "With --compare: worse is more than so many times")
       ->capture_default_str();
+  command
+      ->add_option(
+          "--can", options->can,
+          "Two CAN interfaces on one wire: motor commands go from the first one to simulated ESCs on the "
+          "second one")
+      ->expected(2)
+      ->delimiter(',');
+  command->add_flag("--props-off", options->props_off,
+                    "With --can: no propeller is on any motor of that bus");
   command->add_option("--inject-spin", options->spin,
                       "A fault: SLOT:MILLISECONDS, busy in every run of that slot from the 400th (flight "
                       "lane) or the 5th on");

@@ -20,6 +20,7 @@
 #include "platform/rt/host_identity.hpp"
 #include "platform/rt/lane_thread.hpp"
 #include "platform/rt/memory_lock.hpp"
+#include "platform/rt/service_notifier.hpp"
 #include "platform/sitl/world/input_error.hpp"
 
 namespace roborun::app {
@@ -92,6 +93,12 @@ class Load {
   pid_t pid_{-1};
 };
 
+std::unique_ptr<KernelMotorBus> motor_bus_of(const RealTimeConfig& config, const rt::MonotonicClock& clock) {
+  if (!config.can) return nullptr;
+  return std::make_unique<KernelMotorBus>((*config.can)[0], (*config.can)[1], clock,
+                                          config.mission.minor_frame);
+}
+
 /// Everything of one run; its construction takes all memory.
 class RealTimeRun {
  public:
@@ -103,14 +110,16 @@ class RealTimeRun {
   void collect_trace();
   void fill_lanes(report::AuditReport& report) const;
   void fill_slots(report::AuditReport& report) const;
+  void fill_commands(report::AuditReport& report) const;
 
   const RealTimeConfig& config_;
   std::vector<std::string> missing_;
+  rt::MonotonicClock clock_;
+  std::unique_ptr<KernelMotorBus> motor_bus_;
   CameraServer cameras_;
   SimulatedAircraft aircraft_;
   core::ClockMeter meter_;
   FlightSystem system_;
-  rt::MonotonicClock clock_;
   core::Reactions reactions_;
   WatchdogProgram watchdog_;
   std::atomic<bool> over_{false};  ///< Whatever was measured is measured.
@@ -124,8 +133,9 @@ class RealTimeRun {
 
 RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
     : config_(config),
+      motor_bus_(motor_bus_of(config, clock_)),
       cameras_(world, config.mission.camera, config.mission.seed),
-      aircraft_(world, config.mission, cameras_),
+      aircraft_(world, config.mission, cameras_, motor_bus_.get()),
       system_(world, config.mission, meter_, aircraft_, cameras_.cameras()),
       program_{Injected{system_.flight_program(), config.inject, over_},
                Injected{system_.decision_program(), config.inject, over_},
@@ -146,7 +156,8 @@ RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
 
 void RealTimeRun::start_threads() {
   missing_ = rt::why_not_real_time();
-  const bool fifo = missing_.empty();
+  // Lanes that have to share a CPU share it by priority.
+  const bool fifo = rt::why_no_priority().empty();
   if (const std::string error = rt::lock_memory(); !error.empty()) missing_.push_back(error);
   // The baselines' libraries; a flight with the own map and planner never calls them.
   if (config_.mission.map_backend == "own" && config_.mission.planner_backend == "own")
@@ -163,7 +174,10 @@ void RealTimeRun::start_threads() {
   for (std::size_t i = 0; i < core::kLaneCount; ++i) {
     placement_[i] = rt::placement_of(core::kLanes[i]);
     if (!fifo) placement_[i].priority = 0;
-    lane_[i].start(first, minor_frame);
+    // Timers that expire together are served together, each wake-up before the next: the others come between
+    // the flight lane's releases, so that it waits for nobody's where CPUs are shared.
+    const bool is_flight = core::kLanes[i].id == core::LaneId::kFlight;
+    lane_[i].start(is_flight ? first : first + minor_frame / 2, minor_frame);
     const std::string error = thread_[i].start(placement_[i], true);
     over_.store(!error.empty(), std::memory_order_relaxed);  // the lanes that run must end
     if (!error.empty()) throw sitl::InputError(error);
@@ -229,6 +243,19 @@ void RealTimeRun::fill_slots(report::AuditReport& report) const {
   }
 }
 
+void RealTimeRun::fill_commands(report::AuditReport& report) const {
+  const sitl::CommandMeter& meter = motor_bus_->meter();
+  report::CommandPath& path = report.commands.emplace();
+  path.interfaces = *config_.can;
+  path.sent = meter.sent();
+  path.refused = aircraft_.actuators().node().counters().commands_refused;
+  path.heard = meter.heard();
+  path.lost = meter.lost();
+  path.late = meter.late();
+  path.age = report::summarise(meter.age());
+  path.gap = report::summarise(meter.gap());
+}
+
 report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress) {
   report::AuditReport report;
   const Vector3 start_W = aircraft_.vehicle().state().p_WB;
@@ -236,6 +263,8 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
     const Load load(config_.load);
     const std::uint64_t heap_before = rt::sealed_heap_calls();
     start_threads();
+    rt::ServiceNotifier service;
+    (void)service.tell("READY=1");
     report.locked_bytes = rt::locked_bytes();
     const auto begin = std::chrono::steady_clock::now();
     double told_s = 0.0;
@@ -243,6 +272,7 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
       report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
       collect_trace();
+      if (!lane_[0].overdue(clock_.now())) (void)service.tell("WATCHDOG=1");
       if (progress && report.seconds >= told_s + 1.0) progress(told_s = report.seconds);
     }
     for (rt::LaneThread& thread : thread_) thread.request_stop();
@@ -274,6 +304,7 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
   if (reactions_.stopping()) report.stopped_by = core::slot(reactions_.stopped_by()).name;
   fill_lanes(report);
   fill_slots(report);
+  if (motor_bus_) fill_commands(report);
   report.pools = system_.pools();
   const rt::HostIdentity id = rt::identify_host();
   report.identity = {{"program", "roborun 0.1.0"},

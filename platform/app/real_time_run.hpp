@@ -2,8 +2,10 @@
 /// sensors.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "core/executive/frame_table.hpp"
 #include "platform/app/mission.hpp"
@@ -29,12 +31,15 @@ struct RealTimeConfig {
   bool load{false};  ///< stress-ng on all CPUs meanwhile.
   bool trace{false};
   std::optional<Injection> inject{};
+  /// CAN interfaces of the kernel for the motors' bus: the vehicle's and the ESCs' (KernelMotorBus).
+  std::optional<std::array<std::string, 2>> can{};
 };
 
 /// Takes off in `world` and flies on towards its goal for so many seconds, hovering once it is there. Throws
 /// sitl::InputError if this machine cannot run it in real time (one line that names all that is missing) and
 /// best_effort is off, if stress-ng is wanted and not there, and as fly_mission(). `progress` (may be empty)
-/// is called about once a second with the seconds done.
+/// is called about once a second with the seconds done. Under systemd it says READY=1 once the lanes run, and
+/// WATCHDOG=1 twenty times a second for as long as the flight lane keeps its releases.
 [[nodiscard]] report::AuditReport run_real_time(const sitl::World& world, const RealTimeConfig& config,
                                                 const std::function<void(double)>& progress);
 

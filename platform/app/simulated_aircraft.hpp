@@ -20,13 +20,15 @@ class ExposureSink {
 
 class SimulatedAircraft final : public Aircraft {
  public:
-  /// On the ground below the start of `world`, which must outlive it as `cameras` must.
-  SimulatedAircraft(const sitl::World& world, const MissionConfig& config, ExposureSink& cameras)
+  /// On the ground below the start of `world`, which must outlive it as `cameras` and `motor_bus` must;
+  /// without a `motor_bus` commands go over a simulated one.
+  SimulatedAircraft(const sitl::World& world, const MissionConfig& config, ExposureSink& cameras,
+                    MotorBus* motor_bus = nullptr)
       : vehicle_(config.vehicle, config.wind, Vector3(world.start_W().x(), world.start_W().y(), 0.0),
                  config.seed),
         sensors_(sitl::NavigationSensors(config.sensors, config.seed)),
         cameras_(cameras),
-        actuators_(config.seed, config.minor_frame),
+        actuators_(config.seed, config.minor_frame, motor_bus),
         minor_frame_(config.minor_frame) {
     if (!config.answers) actuators_.ignore_kill_switch();
   }

@@ -104,8 +104,9 @@ SocketCan::~SocketCan() {
   if (fd >= 0) (void)close(fd);
 }
 
-std::string SocketCan::open(const std::string& interface) {
+std::string SocketCan::open(const std::string& interface, Nanos epoch) {
   interface_ = interface;
+  epoch_ = epoch;
   std::string why = connect();
   if (why.empty()) state_ = CanState::kActive;
   return why;
@@ -195,7 +196,7 @@ Status SocketCan::receive(CanFrame& frame) noexcept {
       return error == EAGAIN || error == EINTR ? Status::kNotReady : lose(error);
     }
     if (got != sizeof(in)) continue;
-    const Nanos now = read_clock(CLOCK_MONOTONIC);
+    const Nanos now = read_clock(CLOCK_MONOTONIC) - epoch_;
     Nanos age{0};
     for (cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, c)) {
       if (c->cmsg_level != SOL_SOCKET) continue;

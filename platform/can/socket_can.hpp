@@ -40,8 +40,9 @@ class SocketCan final : public firmware_if::CanBus {
   SocketCan(const SocketCan&) = delete;
   SocketCan& operator=(const SocketCan&) = delete;
 
-  /// Empty: opened. Otherwise what is wrong, in one line. Not for the loop.
-  [[nodiscard]] std::string open(const std::string& interface);
+  /// Empty: opened. Otherwise what is wrong, in one line. Not for the loop. Stamps count from when
+  /// CLOCK_MONOTONIC showed `epoch`.
+  [[nodiscard]] std::string open(const std::string& interface, Nanos epoch = Nanos{0});
   /// Opens the same interface again, from a thread that is not the loop's; the loop's state() follows with
   /// the next frame. kIo: still not there.
   [[nodiscard]] Status reopen();
@@ -57,6 +58,7 @@ class SocketCan final : public firmware_if::CanBus {
   Status lose(int error) noexcept;
 
   std::string interface_;
+  Nanos epoch_{0};
   // Only the loop's thread sets it to -1 (gone) and closes; only reopen() sets it from -1.
   std::atomic<int> socket_{-1};
   firmware_if::CanState state_{firmware_if::CanState::kDetached};

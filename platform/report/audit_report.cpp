@@ -118,6 +118,12 @@ std::string to_json(const AuditReport& r) {
   j["flown_m"] = r.flown_m;
   j["least_clearance_m"] = r.least_clearance_m;
   j["stopped_by"] = r.stopped_by;
+  if (r.commands) {
+    const CommandPath& c = *r.commands;
+    j["commands"] = {{"interfaces", c.interfaces}, {"sent", c.sent},         {"refused", c.refused},
+                     {"heard", c.heard},           {"lost", c.lost},         {"late", c.late},
+                     {"age_us", timing(c.age)},    {"gap_us", timing(c.gap)}};
+  }
   j["lanes"] = Json::array();
   for (const AuditLane& l : r.lanes) j["lanes"].push_back(lane_json(l));
   j["slots"] = Json::array();
@@ -166,6 +172,15 @@ std::string audit_table(const AuditReport& r) {
       r.seconds, r.rate_Hz, r.load ? " under load" : "", r.decisions, r.decisions_too_late, r.flown_m,
       r.heap_sealed ? fmt::format("{}", r.heap_calls_after_start) : "not counted in this build",
       minor_faults(r), major_faults(r), static_cast<double>(r.locked_bytes) / 1048576.0);
+  if (r.commands) {
+    const CommandPath& c = *r.commands;
+    text += fmt::format(
+        "commands from {} to {}: {} sent, {} refused, {} lost, {} late; age p50 / p99.9 / max {:.0f} / "
+        "{:.0f} / {:.0f} us; "
+        "longest gap {:.0f} us\n",
+        c.interfaces[0], c.interfaces[1], c.sent, c.refused, c.lost, c.late, c.age.median_us, c.age.p999_us,
+        c.age.max_us, c.gap.max_us);
+  }
   for (const auto& [name, count] : r.heap_sites) text += fmt::format("  heap: {} x {}\n", count, name);
   if (r.decision_stalls > 0)
     text += fmt::format("the decision lane hung {} times, the last time in {}\n", r.decision_stalls,

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -50,6 +51,15 @@ struct AuditTraceEvent {
   bool overrun{};
 };
 
+/// How throttles reached the ESCs over a real bus. The last of those sent may be neither heard nor lost.
+struct CommandPath {
+  std::array<std::string, 2> interfaces;  ///< The vehicle's, the ESCs'.
+  std::uint64_t sent{}, refused{}, heard{}, lost{};
+  std::uint64_t late{};  ///< Older than a minor frame when they came.
+  TimingSummary age;     ///< From the minor frame that made them to the ESCs.
+  TimingSummary gap;     ///< Between two at the ESCs.
+};
+
 struct AuditReport {
   double seconds{};
   double rate_Hz{};    ///< Of the flight lane.
@@ -64,7 +74,8 @@ struct AuditReport {
   std::uint64_t decision_stalls{};  ///< Times that the watchdog found the decision lane hanging.
   std::string stalled_in;           ///< The slot of the last one.
   double flown_m{}, least_clearance_m{}, speed_mps{};  ///< The speed is that of the end.
-  std::string stopped_by;  ///< The slot whose overruns ended the run; empty if none did.
+  std::string stopped_by;               ///< The slot whose overruns ended the run; empty if none did.
+  std::optional<CommandPath> commands;  ///< Nothing over the simulated bus.
   std::vector<AuditLane> lanes;
   std::vector<AuditSlot> slots;
   std::vector<PoolUse> pools;

@@ -44,14 +44,7 @@ Placement placement_of(const core::LaneSpec& spec) {
   return {cpus[cpus.size() - 1 - index], spec.priority};
 }
 
-std::vector<std::string> why_not_real_time() {
-  std::vector<std::string> reasons;
-  const std::size_t cpus = allowed_cpus().size();
-  for (const core::LaneSpec& spec : core::kLanes) {
-    if (spec.priority > 0 && spec.cpu_index >= cpus)
-      reasons.push_back("CPU: lane " + std::string(spec.name) + " needs a CPU of its own, and there are " +
-                        std::to_string(cpus));
-  }
+std::string why_no_priority() {
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
   pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
@@ -63,13 +56,23 @@ std::vector<std::string> why_not_real_time() {
   pthread_attr_setstacksize(&attributes, kProbeStack_bytes);
   pthread_t probe{};
   const int error = pthread_create(&probe, &attributes, nothing, nullptr);
-  if (error == 0)
-    pthread_join(probe, nullptr);
-  else
-    reasons.push_back("real-time priority: " + std::string(std::strerror(error)) + " (SCHED_FIFO " +
-                      std::to_string(param.sched_priority) +
-                      "): run as root, grant CAP_SYS_NICE, or raise 'rtprio' in /etc/security/limits.conf");
+  if (error == 0) pthread_join(probe, nullptr);
   pthread_attr_destroy(&attributes);
+  if (error == 0) return {};
+  return "real-time priority: " + std::string(std::strerror(error)) + " (SCHED_FIFO " +
+         std::to_string(param.sched_priority) +
+         "): run as root, grant CAP_SYS_NICE, or raise 'rtprio' in /etc/security/limits.conf";
+}
+
+std::vector<std::string> why_not_real_time() {
+  std::vector<std::string> reasons;
+  const std::size_t cpus = allowed_cpus().size();
+  for (const core::LaneSpec& spec : core::kLanes) {
+    if (spec.priority > 0 && spec.cpu_index >= cpus)
+      reasons.push_back("CPU: lane " + std::string(spec.name) + " needs a CPU of its own, and there are " +
+                        std::to_string(cpus));
+  }
+  if (std::string why = why_no_priority(); !why.empty()) reasons.push_back(std::move(why));
   return reasons;
 }
 

@@ -24,8 +24,10 @@ struct Placement {
 /// For the lane as the frame table wants it, on the CPUs that this process may use; a lane whose own CPU does
 /// not exist shares the last one.
 [[nodiscard]] Placement placement_of(const core::LaneSpec& spec);
-/// Empty if this process may run threads like that, otherwise one line a reason: no real-time privilege, no
-/// such CPU. `lanes` whose CPU does not exist are such a reason too.
+/// Empty if this process may run threads at the lanes' priorities, otherwise why not, in one line.
+[[nodiscard]] std::string why_no_priority();
+/// Empty if this process may run all lanes as the frame table wants them, otherwise one line a reason: no
+/// real-time privilege, no CPU for a lane.
 [[nodiscard]] std::vector<std::string> why_not_real_time();
 
 /// Sleeps to each release by absolute time, and runs the frame. The stack is mapped, painted and prefaulted

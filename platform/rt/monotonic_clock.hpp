@@ -12,6 +12,8 @@ class MonotonicClock final : public firmware_if::Clock {
  public:
   MonotonicClock() noexcept : epoch_(raw()) {}
   [[nodiscard]] MonotonicTime now() const noexcept override { return MonotonicTime{raw() - epoch_}; }
+  /// What CLOCK_MONOTONIC showed at the start of the run.
+  [[nodiscard]] Nanos epoch() const noexcept { return epoch_; }
   /// For system calls that take an absolute CLOCK_MONOTONIC time.
   [[nodiscard]] timespec raw_time(MonotonicTime time) const noexcept {
     const std::int64_t ns = (time.time_since_epoch() + epoch_).count();

@@ -52,6 +52,10 @@ refuses "cannot be opened" can decode --candump nope.log
 refuses "required" gpio check --open x
 refuses "subcommand" 
 refuses "1 to 86400" audit --seconds 0
+refuses "paper, host, or a file" audit --profile x
+refuses "nope.toml" audit --settings nope.toml
+refuses "say --props-off" audit --can can0,can1
+refuses "nope0" audit --can nope0,nope0 --props-off --best-effort --profile paper
 refuses "100, 125, 160, 200, 250, 320 or 400" audit --rate 333
 refuses "100, 125, 160, 200, 250, 320 or 400" audit --rate 1000
 refuses "100, 125, 160, 200, 250, 320 or 400" audit --rate -400

@@ -2,11 +2,13 @@
 /// may be late, but it may not call the heap, fault a page in, or let one lane's fault take another one's
 /// frames.
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include <algorithm>
 
 #include "platform/app/board_profile.hpp"
 #include "platform/app/real_time_run.hpp"
+#include "platform/rt/lane_thread.hpp"
 #include "platform/sitl/world/world_file.hpp"
 
 namespace roborun::app {
@@ -49,6 +51,26 @@ TEST_F(RealTimeRun, FliesWithoutAHeapCallOrAPageFault) {
   EXPECT_EQ(report::major_faults(r), 0U);
   EXPECT_LE(r.locked_bytes, 64U << 20U);
   for (const report::PoolUse& p : r.pools) EXPECT_LE(p.high_water, p.count) << p.name;
+}
+
+TEST_F(RealTimeRun, LanesThatShareACpuKeepTheirPrioritiesAndTheReportSaysSo) {
+  if (const std::string why = rt::why_no_priority(); !why.empty()) GTEST_SKIP() << why;
+  cpu_set_t all, one;
+  ASSERT_EQ(sched_getaffinity(0, sizeof all, &all), 0);
+  CPU_ZERO(&one);
+  for (std::size_t cpu = 0; CPU_COUNT(&one) == 0; ++cpu) {
+    if (CPU_ISSET(cpu, &all)) CPU_SET(cpu, &one);
+  }
+  ASSERT_EQ(sched_setaffinity(0, sizeof one, &one), 0);
+  config.seconds = 2.0;
+  const report::AuditReport r = run_real_time(world, config, {});
+  ASSERT_EQ(sched_setaffinity(0, sizeof all, &all), 0);
+  EXPECT_EQ(lane(r, core::LaneId::kFlight).priority, 80);
+  EXPECT_EQ(lane(r, core::LaneId::kDecision).priority, 60);
+  EXPECT_EQ(lane(r, core::LaneId::kDecision).cpu, lane(r, core::LaneId::kFlight).cpu);
+  EXPECT_GT(lane(r, core::LaneId::kFlight).frames, 100U);
+  ASSERT_FALSE(r.missing.empty());
+  EXPECT_EQ(r.missing.front().rfind("CPU: lane decision", 0), 0U) << r.missing.front();
 }
 
 TEST_F(RealTimeRun, AStageThatSpinsInTheDecisionLaneTakesNoFrameFromTheFlightLane) {

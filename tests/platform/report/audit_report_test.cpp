@@ -138,6 +138,24 @@ TEST(AuditReport, TableSaysWhatIsMissing) {
   EXPECT_EQ(Json::parse(to_json(r)).at("missing").at(0), "memory lock: no");
 }
 
+TEST(AuditReport, TellsHowCommandsReachedTheEscsOverARealBusAndOnlyThen) {
+  AuditReport r = sample();
+  EXPECT_FALSE(Json::parse(to_json(r)).contains("commands"));
+  CommandPath& path = r.commands.emplace();
+  path.interfaces = {"can0", "can1"};
+  path.sent = 1000;
+  path.heard = 996;
+  path.lost = 3;
+  path.late = 2;
+  path.age.max_us = 1234.0;
+  const Json commands = Json::parse(to_json(r)).at("commands");
+  EXPECT_EQ(commands.at("lost"), 3);
+  EXPECT_EQ(commands.at("late"), 2);
+  EXPECT_EQ(commands.at("age_us").at("max"), 1234.0);
+  EXPECT_NE(audit_table(r).find("commands from can0 to can1: 1000 sent, 0 refused, 3 lost, 2 late"),
+            std::string::npos);
+}
+
 TEST(CompareAudits, FindsWhatBecameWorseAndOnlyThat) {
   const AuditReport before = sample();
   EXPECT_TRUE(compare_audits(to_json(before), to_json(before), 1.5).worse.empty());
