@@ -70,7 +70,7 @@ struct Situation {
   int failures{};  ///< Decisions in a row without a trajectory.
   double distance_to_goal_m{};
   bool surveying{};  ///< The flight goes on to its hover whatever comes of this decision.
-  bool motion{};  ///< Something moves nearby.
+  bool motion{};     ///< Something moves nearby.
 };
 
 /// What was decided, and why.

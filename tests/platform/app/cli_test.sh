@@ -52,7 +52,7 @@ refuses "cannot be opened" can decode --candump nope.log
 refuses "required" gpio check --open x
 refuses "subcommand" 
 refuses "1 to 86400" audit --seconds 0
-refuses "paper, host, or a file" audit --profile x
+refuses "paper, host, cortex-a72, or a file" audit --profile x
 refuses "nope.toml" audit --settings nope.toml
 refuses "say --props-off" audit --can can0,can1
 refuses "nope0" audit --can nope0,nope0 --props-off --best-effort --profile paper

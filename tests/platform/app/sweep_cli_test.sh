@@ -34,7 +34,6 @@ refuses "given twice" --designs aware,aware
 refuses "paper, host, cortex-a72, or a file" --profile nope
 refuses "given twice" --profile paper,paper
 refuses "must have those of map octomap, planner own" --profile cortex-a72 --map octomap
-refuses "cannot be opened" compare /nonexistent
 refuses "whole number" --seeds 1,-2
 refuses "whole number" --seeds ""
 refuses "given twice" --seeds 3,3
