@@ -133,6 +133,7 @@ Estimate estimate(const std::vector<const SweepRow*>& rows, double (*value)(cons
   if (all.count == 0) return e;
   e.mean = all.sum / all.count;
   std::vector<double> means;
+  means.reserve(of_seed.size());
   for (const auto& [seed, s] : of_seed) means.push_back(s.sum / s.count);
   e.half_95 = half_95(means);
   return e;
@@ -193,6 +194,7 @@ Gain gain(const std::vector<const SweepRow*>& mine, const std::vector<const Swee
                                        &g.cpu_s_per_decision};
   for (std::size_t i = 0; i < value.size(); ++i) {
     std::vector<double> ratios;
+    ratios.reserve(of_seed.size());
     for (const auto& [seed, pairs] : of_seed) ratios.push_back(pairs.ratios()[i]);
     *value[i] = {all.ratios()[i], half_95(ratios)};
   }

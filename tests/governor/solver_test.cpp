@@ -285,6 +285,7 @@ TEST(FitLatency, IsNotNegativeAndNeverDearerForCoarserCellsWhateverIsMeasured) {
   core::CounterRng rng(11);
   for (int trial = 0; trial < 50; ++trial) {
     std::vector<LatencyPoint> points;
+    points.reserve(40);
     for (int i = 0; i < 40; ++i)
       points.push_back({i % kPrecisionLevels, rng.uniform(0.0, 5e4), rng.uniform(-0.1, 1.0)});
     const LatencyModel model = fit_latency(points);
