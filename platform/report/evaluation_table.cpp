@@ -35,18 +35,6 @@ std::vector<std::string> names_of(const std::vector<SweepRow>& rows,
 std::string design_of(const MissionResult& r) { return r.design; }
 std::string profile_of(const MissionResult& r) { return r.profile; }
 
-struct Knob {
-  const char* name;
-  double (*value)(const SweepRow&);
-  double (*printed_ratio)(const Published&);
-};
-constexpr std::array<Knob, 3> kKnobs{{{"density", [](const SweepRow& r) { return r.density_ratio; },
-                                       [](const Published& p) { return p.time_ratio_density; }},
-                                      {"spread, m", [](const SweepRow& r) { return r.spread_m; },
-                                       [](const Published& p) { return p.time_ratio_spread; }},
-                                      {"goal distance, m", [](const SweepRow& r) { return r.distance_m; },
-                                       [](const Published& p) { return p.time_ratio_distance; }}}};
-
 /// Mean time of the missions at `high` over that at `low`, for each seed that has both.
 Estimate time_ratio(const std::vector<const SweepRow*>& high, const std::vector<const SweepRow*>& low) {
   std::set<std::uint64_t> seeds;

@@ -119,12 +119,6 @@ void draw_bars(Svg& svg, const std::vector<DesignSummary>& summaries, const Bar&
   }
 }
 
-struct Knob {
-  const char* name;
-  double (*value)(const SweepRow&);
-  double (*printed_ratio)(const Published&);
-};
-
 struct Metric {
   const char* name;
   double (*value)(const MissionResult&);
@@ -317,12 +311,6 @@ std::string overall_svg(const std::vector<SweepRow>& rows) {
 }
 
 std::string sensitivity_svg(const std::vector<SweepRow>& rows, const std::string& profile) {
-  constexpr std::array<Knob, 3> kKnobs{{{"density", [](const SweepRow& r) { return r.density_ratio; },
-                                         [](const Published& p) { return p.time_ratio_density; }},
-                                        {"spread, m", [](const SweepRow& r) { return r.spread_m; },
-                                         [](const Published& p) { return p.time_ratio_spread; }},
-                                        {"goal distance, m", [](const SweepRow& r) { return r.distance_m; },
-                                         [](const Published& p) { return p.time_ratio_distance; }}}};
   constexpr std::array<Metric, 3> kMetrics{{{"mission time, s,", mission_time, true},
                                             {"velocity, m/s,", velocity, false},
                                             {"energy, kJ,", energy, false}}};
