@@ -20,6 +20,8 @@ constexpr int kMotionPoints = 3;
 constexpr double kStanding_mps = 0.5;
 constexpr double kTooFast = 1.5;
 constexpr Nanos kMotionMemory{3'000'000'000};
+constexpr Nanos kTraceMemory{10'000'000'000};  // as long as the map may remember what has gone
+constexpr double kTraceSpacing_m = 0.6;
 /// What the way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
 constexpr double kBeyond_mps = 2.0;
 
@@ -63,19 +65,28 @@ core::MeteredBudget DecisionPipeline::table_budget_of(core::StageId id) noexcept
   return {meter_, id, meter_.grant(id, core::slot(core::slot_of(id)).budget)};
 }
 
-bool DecisionPipeline::sees_motion(const DecisionInput& in, const Aabb& relevant_W, core::StageBudget& budget,
-                                   core::Work& work) const noexcept {
+void DecisionPipeline::sense_motion(const DecisionInput& in, const Aabb& relevant_W,
+                                    core::StageBudget& budget, core::Work& work) noexcept {
   const stages::PolledView known(map_.view(), budget, work);
+  core::StaticVector<Vector3, kTraces / 4> appeared_W;
   int appeared = 0;
   for (const stages::CloudPoint& point : cloud_.points()) {
     const Vector3 offset = point.p_W - in.p_WB;
     const bool behind = offset.dot(in.v_WB) < 0.0 && in.v_WB.norm() > kStanding_mps;
     if (offset.norm() > kMotionReach_m || behind || !relevant_W.contains(point.p_W)) continue;
-    if (known.is_free_at_finest(Aabb::around(point.p_W, 0.5 * kFinestCell_m), work.units) &&
-        ++appeared == kMotionPoints)
-      return true;
+    if (!known.is_free_at_finest(Aabb::around(point.p_W, 0.5 * kFinestCell_m), work.units)) continue;
+    ++appeared;
+    const bool noted = std::any_of(appeared_W.begin(), appeared_W.end(), [&point](const Vector3& other_W) {
+      return (other_W - point.p_W).squaredNorm() < kTraceSpacing_m * kTraceSpacing_m;
+    });
+    if (!noted && !appeared_W.push_back(point.p_W)) break;
   }
-  return false;
+  if (appeared < kMotionPoints) return;
+  motion_until_ = in.now + kMotionMemory;
+  for (const Vector3& p_W : appeared_W) {
+    trace_[next_trace_] = {p_W, in.now + kTraceMemory};
+    next_trace_ = (next_trace_ + 1) % kTraces;
+  }
 }
 
 void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) noexcept {
@@ -85,7 +96,7 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   const double r_m = radius_m();
   const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m),
                         config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
-  if (sees_motion(in, relevant_W, budget, work)) motion_until_ = in.now + kMotionMemory;
+  sense_motion(in, relevant_W, budget, work);
   out.motion = in.now < motion_until_;
   (void)profile_space({}, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W,
                       relevant_W, r_m, out.profile, budget, work);
@@ -113,7 +124,15 @@ void DecisionPipeline::integrate(const DecisionInput& in, DecisionOutput& out) n
   const OperatingPoint& point = out.decision.point;
   core::MeteredBudget budget = budget_of(core::StageId::kMap, out);
   stages::IntegrationResult integrated;
-  (void)map_.integrate({in.frames, point.p0_level, point.v0_m3, {trajectory_W.begin(), trajectory_W.size()}},
+  core::StaticVector<Vector3, kTraces> moved_W;
+  for (const Trace& trace : trace_) {
+    if (in.now < trace.until) (void)moved_W.push_back(trace.p_W);
+  }
+  (void)map_.integrate({in.frames,
+                        point.p0_level,
+                        point.v0_m3,
+                        {trajectory_W.begin(), trajectory_W.size()},
+                        {moved_W.begin(), moved_W.size()}},
                        budget, integrated);
   charge(core::StageId::kMap, integrated.work, out);
 }

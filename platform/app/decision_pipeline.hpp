@@ -86,12 +86,19 @@ class DecisionPipeline {
   [[nodiscard]] double radius_m() const noexcept { return config_.vehicle_radius_m + config_.inflation_m; }
 
  private:
+  /// Where something was seen to move, a ring.
+  struct Trace {
+    Vector3 p_W = Vector3::Zero();
+    MonotonicTime until{};
+  };
+  static constexpr std::size_t kTraces = 64;
+
   void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
   void perceive(const DecisionInput& in, DecisionOutput& out) noexcept;
-  /// Surfaces near the vehicle where the map, before it gets these images, knows free space. Not behind it:
-  /// who is followed must not slow down.
-  [[nodiscard]] bool sees_motion(const DecisionInput& in, const Aabb& relevant_W, core::StageBudget& budget,
-                                 core::Work& work) const noexcept;
+  /// Notes surfaces near the vehicle where the map, before it gets these images, knows free space. Not behind
+  /// it: who is followed must not slow down.
+  void sense_motion(const DecisionInput& in, const Aabb& relevant_W, core::StageBudget& budget,
+                    core::Work& work) noexcept;
   void govern(const DecisionInput& in, DecisionOutput& out) noexcept;
   void integrate(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// What is flown, on the map that just got its images.
@@ -116,6 +123,8 @@ class DecisionPipeline {
   stages::Smoother& smoother_;
   stages::Path kept_W_;  ///< What was planned last.
   MonotonicTime motion_until_{};
+  std::array<Trace, kTraces> trace_{};
+  std::size_t next_trace_{0};
   int failures_{0};  ///< Decisions in a row without a trajectory.
 };
 

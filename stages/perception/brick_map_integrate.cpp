@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "stages/perception/brick_map.hpp"
 
@@ -29,7 +30,8 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
   guard_.begin(request.frames);
   for (std::size_t i = 0; i < request.frames.size(); ++i) {
     const PosedDepthFrame& posed = request.frames[i];
-    if (cameras_.count == config_.max_frames || guard_.check(posed) != Status::kOk || is_white(posed) ||
+    if (cameras_.count == config_.max_frames || guard_.check(posed) != Status::kOk ||
+        is_white(posed, request.moved_W) ||
         pyramid_[cameras_.count]->build(posed.frame, tile_shift(posed.frame, request.level)) != Status::kOk) {
       ++result.frames_refused;
       continue;
@@ -63,27 +65,37 @@ Vector3 BrickMap::unit_center_W(const Position& unit) const noexcept {
   return corner_W_ + cell_size_m(unit_level_) * Vector3(unit.x + 0.5, unit.y + 0.5, unit.z + 0.5);
 }
 
-bool BrickMap::is_white(const PosedDepthFrame& posed) const noexcept {
+bool BrickMap::is_white(const PosedDepthFrame& posed, std::span<const Vector3> moved_W) const noexcept {
   constexpr int kRays = 8;          // in each direction
   constexpr int kLeastBlocked = 3;  // one may be a stray cell
+  constexpr double kMoved_m = 1.5;  // about twice a body's radius
   constexpr double kStep_m = 0.5 * kBrick_m, kFineStep_m = 0.5 * kFinestCell_m;
   const firmware_if::DepthFrame& frame = posed.frame;
   if (posed.is_cloud || pixel_counts(frame.depth_m, frame.range_m).surfaces > 0) return false;
   const double end_m = 0.8 * static_cast<double>(frame.range_m);
+  const auto moved_nearby = [&moved_W](const Vector3& p_W) {
+    return std::any_of(moved_W.begin(), moved_W.end(), [&p_W](const Vector3& m_W) {
+      return (m_W - p_W).squaredNorm() < kMoved_m * kMoved_m;
+    });
+  };
+  Cell cell{};
+  const auto brick_around = [&](const Vector3& p_W) -> const Brick* {
+    if (!cell_of(p_W, cell)) return nullptr;
+    return brick_at(slot_of(cell.x >> kBrickLevel, cell.y >> kBrickLevel, cell.z >> kBrickLevel));
+  };
   const auto meets_surface = [&](const Vector3& ray_W) {
     const double length = ray_W.norm();
-    Cell cell{};
+    bool near_end = true;  // The brick at that end of the piece has a surface.
     for (double far_m = kStep_m / length; far_m < end_m; far_m += kStep_m / length) {
-      if (!cell_of(posed.X_WC.p_RT + far_m * ray_W, cell)) return false;
-      const Brick* brick =
-          brick_at(slot_of(cell.x >> kBrickLevel, cell.y >> kBrickLevel, cell.z >> kBrickLevel));
-      if (brick == nullptr || (brick->flags(kBrickLevel, 0) & content::kOccupied) == 0) continue;
+      const Brick* brick = brick_around(posed.X_WC.p_RT + far_m * ray_W);
+      const bool far_end = brick != nullptr && (brick->flags(kBrickLevel, 0) & content::kOccupied) != 0;
+      if (!std::exchange(near_end, far_end) && !far_end) continue;
       for (double at_m = far_m - kStep_m / length; at_m < far_m; at_m += kFineStep_m / length) {
-        if (!cell_of(posed.X_WC.p_RT + at_m * ray_W, cell)) return false;
-        brick = brick_at(slot_of(cell.x >> kBrickLevel, cell.y >> kBrickLevel, cell.z >> kBrickLevel));
+        const Vector3 at_W = posed.X_WC.p_RT + at_m * ray_W;
+        brick = brick_around(at_W);
         if (brick != nullptr &&
             evidence::is_occupied(brick->cell(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)))))
-          return true;
+          return !moved_nearby(at_W);
       }
     }
     return false;

@@ -26,6 +26,9 @@ struct IntegrationRequest {
   double volume_m3{0.0};  ///< v0: space nearest to `trajectory_W` first, until this is spent.
   std::span<const Vector3>
       trajectory_W{};  ///< Points of the committed trajectory; at least the vehicle itself.
+  /// Where something was seen to move lately: what the map holds near these may be gone, and an image that
+  /// shows nothing there is not suspicious (own map).
+  std::span<const Vector3> moved_W{};
 };
 
 struct IntegrationResult {

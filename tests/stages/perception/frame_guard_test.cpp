@@ -104,9 +104,9 @@ struct Fault {
   std::function<void(Shot&, std::size_t)> break_frame;
 };
 
-class BadFrame : public ::testing::TestWithParam<Fault> {
+class GuardedMap : public ::testing::Test {
  protected:
-  BadFrame() : block_(64U << 20U), arena_(block_) {
+  GuardedMap() : block_(64U << 20U), arena_(block_) {
     BrickMap::Config config;
     config.bounds_W = {Vector3(-30, -30, -3), Vector3(30, 30, 12)};
     config.max_bricks = 2000;
@@ -114,9 +114,9 @@ class BadFrame : public ::testing::TestWithParam<Fault> {
     sut_ = std::make_unique<BrickMap>(config, arena_);
     scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)}, {Vector3(6, -2, 0), Vector3(8, 2, 12)}};
   }
-  Status see(const Shot& shot) {
+  Status see(const Shot& shot, std::span<const Vector3> moved_W = {}) {
     const std::array<Vector3, 1> here{Vector3(0.1, 0.2, 5.0)};
-    return sut_->integrate({shot.frames, 0, 1e18, here}, unlimited_, result_);
+    return sut_->integrate({shot.frames, 0, 1e18, here, moved_W}, unlimited_, result_);
   }
   std::vector<std::byte> block_;
   core::Arena arena_;
@@ -125,6 +125,8 @@ class BadFrame : public ::testing::TestWithParam<Fault> {
   core::UnlimitedBudget unlimited_;
   IntegrationResult result_;
 };
+
+class BadFrame : public GuardedMap, public ::testing::WithParamInterface<Fault> {};
 
 /// The camera that looks at the pillar and the ground goes bad for 20 scans while the world behind it is
 /// empty.
@@ -163,6 +165,33 @@ TEST_P(BadFrame, AScanOfNothingElseChangesNothing) {
   GetParam().break_frame(shot, 0);
   EXPECT_EQ(see(shot), Status::kInvalidArgument);
   EXPECT_EQ(sut_->digest(), before);
+}
+
+/// What a body left in the map is no reason to disbelieve the camera that now sees the open sky.
+TEST_F(GuardedMap, BodyOverheadIsClearedByAWhiteImageWhereItWasSeenToMove) {
+  scene_.solid = {{Vector3(-0.6, -0.5, 8.0), Vector3(0.8, 0.9, 9.0)}};
+  const std::array<Vector3, 1> body_W{Vector3(0.1, 0.2, 8.0)};
+  const std::array<Vector3, 1> elsewhere_W{Vector3(0.1, 4.2, 8.0)};
+  const auto is_free = [this, &body_W] {
+    core::Work work;
+    (void)sut_->export_view({0, 1e18, Vector3(0.1, 0.2, 5.0)}, unlimited_, work);
+    std::uint64_t lookups = 0;
+    return sut_->view().at(body_W[0] + Vector3(0.0, 0.0, 0.15), lookups) == CellState::kFree;
+  };
+  ASSERT_EQ(see(Shot(scene_, 1.0)), Status::kOk);
+  ASSERT_FALSE(is_free());
+  scene_.solid = {};
+  const auto see_nothing = [this](int n, std::span<const Vector3> moved_W) {
+    return see(Shot(scene_, 1.0 + 0.1 * n, Vector3(0.1, 0.2, 5.0 + 0.001 * n)), moved_W);
+  };
+  for (int n = 1; n <= 10; ++n) {
+    ASSERT_EQ(see_nothing(n, elsewhere_W), Status::kOk);
+    ASSERT_EQ(result_.frames_refused, 1U) << n;
+  }
+  EXPECT_FALSE(is_free());
+  for (int n = 11; n <= 20; ++n) ASSERT_EQ(see_nothing(n, body_W), Status::kOk);
+  EXPECT_EQ(result_.frames_refused, 0U);
+  EXPECT_TRUE(is_free());
 }
 
 INSTANTIATE_TEST_SUITE_P(
