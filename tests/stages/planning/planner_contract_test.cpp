@@ -275,6 +275,18 @@ TEST_F(RrtStarTest, FindsWhatItFoundBeforeWithLessVolume) {
   EXPECT_LT(without, past - 8) << "or the volume is no limit, and this test shows nothing";
 }
 
+/// In front of a rack whose first layer of cells is all that is known of it, the aisle beside it unknown.
+TEST_F(RrtStarTest, GoesAsideOfAWallOfOneCellAhead) {
+  test::BoxView view;
+  view.free_W = {Vector3(-24, -24, 0), Vector3(2, 24, 12)};
+  for (const double wall_m : {1.7, 1.8, 1.9}) {
+    view.occupied = {{Vector3(wall_m, -0.6, 0), Vector3(wall_m + kFinestCell_m, 0.6, 12)}};
+    const Status status = sut_.plan(request_to(Vector3(42, 0, 5)), view, unlimited_, result_);
+    ASSERT_EQ(status, Status::kOk) << wall_m;
+    EXPECT_GT(std::abs(result_.path_W.back().y()), 1.4) << wall_m;
+  }
+}
+
 TEST_F(RrtStarTest, StopsAtVolumeAndBudget) {
   const test::BoxView view = pillar_world();
   PlanRequest r = request_to(Vector3(150, 0, 5));
