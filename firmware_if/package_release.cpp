@@ -3,7 +3,7 @@
 namespace roborun::firmware_if {
 namespace {
 
-constexpr Nanos kRepeat{1'000'000'000};
+constexpr Nanos kSayAgain{1'000'000'000};
 
 }  // namespace
 
@@ -18,7 +18,7 @@ Status PackageRelease::step(MonotonicTime now, const Input& in) noexcept {
   if (open && !open_) ++counters_.releases;
   open_ = open;
   gate_.allow_release(open);
-  if (!said_ || said_open_ != open || now - said_at_ >= kRepeat) {
+  if (!said_ || said_open_ != open || now - said_at_ >= kSayAgain) {
     const dronecan::HardpointCommand command{.hardpoint_id = config_.hardpoint_id,
                                              .command = static_cast<std::uint16_t>(open ? 0 : 1)};
     if (gate_.send(command, now) == Status::kOk) {

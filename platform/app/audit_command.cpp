@@ -22,7 +22,7 @@ namespace {
 
 using sitl::InputError;
 
-struct Options {
+struct AuditOptions {
   double seconds{60.0};
   int rate_Hz{400};
   std::string env{"14"};
@@ -41,7 +41,7 @@ struct Options {
   bool props_off{false};
 };
 
-int compare(const Options& options) {
+int compare(const AuditOptions& options) {
   if (!(options.tolerance_ratio >= 1.0 && options.tolerance_ratio <= 100.0))
     throw InputError(
         fmt::format("--tolerance: {} is out of range: must be from 1 to 100", options.tolerance_ratio));
@@ -79,7 +79,7 @@ std::optional<Injection> injection_of(const std::string& text) {
       fmt::format("--inject-spin: '{}' must be SLOT:MILLISECONDS, with a slot of the frame table", text));
 }
 
-int audit(const Options& options) {
+int audit(const AuditOptions& options) {
   if (!options.compare.empty()) return compare(options);
   if (!options.can.empty() && !options.props_off)
     throw InputError("--can: real ESCs on that bus would turn: take the propellers off and say --props-off");
@@ -133,7 +133,7 @@ int audit(const Options& options) {
 }  // namespace
 
 void add_audit_command(CLI::App& app, std::function<int()>& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<AuditOptions>();
   CLI::App* command = app.add_subcommand(
       "audit", "Fly in real time on simulated sensors, and report time and memory, slot by slot");
   command->footer(

@@ -18,7 +18,7 @@
 namespace roborun::app {
 namespace {
 
-struct Options {
+struct CalibrateOptions {
   std::string out;
   std::string plot;
   BackendNames backends{};
@@ -66,7 +66,7 @@ std::string plot_of(const BoardProfile& board, const BoardSweep& sweep) {
   return report::calibration_svg(fmt::format("What the stages cost on {}", board.machine), panels);
 }
 
-int calibrate_board(const Options& options) {
+int calibrate_board(const CalibrateOptions& options) {
   BoardSweep sweep;
   BoardProfile board;
   {
@@ -114,7 +114,7 @@ int calibrate_board(const Options& options) {
   return 0;
 }
 
-int calibrate_stopping(const Options& options) {
+int calibrate_stopping(const CalibrateOptions& options) {
   std::vector<StoppingPoint> points;
   {
     ProgressLine line;
@@ -152,7 +152,7 @@ int calibrate_stopping(const Options& options) {
 }  // namespace
 
 void add_calibrate_command(CLI::App& app, std::function<int()>& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CalibrateOptions>();
   CLI::App* command = app.add_subcommand("calibrate", "Measure what the stages cost on this machine");
   command->footer(
       "Sweeps 6 precisions x 8 volumes of map integration, export and planning, fits a non-negative, "

@@ -162,12 +162,12 @@ std::string explain_decision(const std::string& name, const std::string& csv, do
 }
 
 void add_explain_command(CLI::App& app, std::function<int()>& run) {
-  struct Options {
+  struct ExplainOptions {
     std::string file;
     double at_s{0.0};
     std::string design;
   };
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ExplainOptions>();
   CLI::App* command = app.add_subcommand("explain", "Why a decision was what it was, in plain words");
   command->footer(
       "Example:\n"

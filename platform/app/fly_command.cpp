@@ -28,7 +28,7 @@ namespace {
 
 using sitl::InputError;
 
-struct Options {
+struct FlyOptions {
   std::string env{"14"};
   std::string mission{"package_delivery"};
   std::string design{"aware"};
@@ -64,7 +64,7 @@ std::optional<Vector3> point_of(const char* option, const std::string& text) {
   return p_W;
 }
 
-Profile profile_of(const Options& options) {
+Profile profile_of(const FlyOptions& options) {
   if (!(options.host_factor > 0.0 && options.host_factor <= 1000.0)) {
     throw InputError(
         fmt::format("--host-factor: {} is out of range: must be above 0, at most 1000", options.host_factor));
@@ -78,7 +78,7 @@ Profile profile_of(const Options& options) {
   return profile;
 }
 
-int fly(const Options& options) {
+int fly(const FlyOptions& options) {
   // Everything is checked before the first metre is flown.
   std::vector<governor::Design> designs;
   for (const std::string& name : split(options.design)) designs.push_back(design_of("--design", name));
@@ -171,7 +171,7 @@ int fly(const Options& options) {
 }  // namespace
 
 void add_fly_command(CLI::App& app, std::function<int()>& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<FlyOptions>();
   CLI::App* fly_app = app.add_subcommand(
       "fly", "Fly a mission in simulation: depth images, map, planner, dynamics, all real");
   fly_app->footer(

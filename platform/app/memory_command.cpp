@@ -13,13 +13,13 @@
 namespace roborun::app {
 namespace {
 
-struct Options {
+struct MemoryOptions {
   std::string env{"14"};
   double fly_s{0.0};
   bool json{false};
 };
 
-int memory(const Options& options) {
+int memory(const MemoryOptions& options) {
   const sitl::World world =
       sitl::generate(sitl::environment(options.env).knobs, sitl::Mission::kPackageDelivery, 1);
   const Profile profile = paper();
@@ -65,7 +65,7 @@ int memory(const Options& options) {
 }  // namespace
 
 void add_memory_command(CLI::App& app, std::function<int()>& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<MemoryOptions>();
   CLI::App* command =
       app.add_subcommand("memory", "The memory plan: every pool's size, count, bytes and high-water mark");
   command->footer(

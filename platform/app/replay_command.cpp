@@ -12,12 +12,12 @@
 namespace roborun::app {
 namespace {
 
-struct Options {
+struct ReplayOptions {
   std::string file;
   bool json{false};
 };
 
-int replay(const Options& options) {
+int replay(const ReplayOptions& options) {
   ProgressLine line;
   const ReplayResult r = replay_flight(options.file, [&line](double done_s) {
     if (line.due())
@@ -45,7 +45,7 @@ int replay(const Options& options) {
 }  // namespace
 
 void add_replay_command(CLI::App& app, std::function<int()>& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ReplayOptions>();
   CLI::App* command =
       app.add_subcommand("replay", "Fly a recording once more, from its sensor samples and images alone");
   command->footer(

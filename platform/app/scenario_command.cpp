@@ -26,7 +26,7 @@ using nlohmann::json;
 using sitl::InputError;
 namespace fs = std::filesystem;
 
-struct Options {
+struct ScenarioOptions {
   std::string path;
   std::string junit;
   std::string jobs{std::to_string(std::max(1U, std::thread::hardware_concurrency()))};
@@ -99,7 +99,7 @@ void tell(const json& v) {
   for (const json& c : v["complaints"]) fmt::print("      {}\n", c.get<std::string>());
 }
 
-int run_scenarios(const Options& options) {
+int run_scenarios(const ScenarioOptions& options) {
   const int jobs = jobs_of(options.jobs);
   if (const std::string why = report::cannot_write(options.junit); !why.empty()) throw InputError(why);
   // Every file is checked before the first one is flown.
@@ -146,7 +146,7 @@ int run_scenarios(const Options& options) {
 }  // namespace
 
 void add_scenario_command(CLI::App& app, std::function<int()>& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ScenarioOptions>();
   CLI::App* scenario_app =
       app.add_subcommand("scenario", "Fly scenarios with faults from files, and judge each flight");
   scenario_app->require_subcommand(1);

@@ -23,7 +23,7 @@ namespace {
 
 using sitl::InputError;
 
-struct Options {
+struct SweepOptions {
   std::string suite{"paper27"};
   std::string environments;
   std::string mission{"package_delivery"};
@@ -75,7 +75,7 @@ void set_shard(const std::string& text, SweepPlan& plan) {
   plan.shards = *count;
 }
 
-SweepPlan plan_of(const Options& options, SweepInputs& inputs) {
+SweepPlan plan_of(const SweepOptions& options, SweepInputs& inputs) {
   SweepPlan plan;
   if (options.suite != plan.suite)
     throw InputError(fmt::format("--suite: unknown suite '{}': must be paper27", options.suite));
@@ -115,7 +115,7 @@ SweepPlan plan_of(const Options& options, SweepInputs& inputs) {
   return plan;
 }
 
-void tell(const SweepStore& store, const Options& options) {
+void tell(const SweepStore& store, const SweepOptions& options) {
   const std::vector<report::SweepRow> rows = rows_of(store);
   const SweepPlan& plan = store.plan();
   // The report is of the whole sweep: `merge` writes it for shards.
@@ -132,7 +132,7 @@ void tell(const SweepStore& store, const Options& options) {
   if (report) fmt::print("report: {}/report.html\n", store.folder());
 }
 
-int sweep(const Options& options) {
+int sweep(const SweepOptions& options) {
   SweepInputs inputs;
   const SweepPlan plan = plan_of(options, inputs);
   const int jobs = jobs_of(options.jobs);
@@ -145,14 +145,14 @@ int sweep(const Options& options) {
   return complete ? 0 : 1;
 }
 
-int merge(const Options& options) {
+int merge(const SweepOptions& options) {
   merge_shards(options.merged, options.out);
   const SweepStore store(options.out, plan_of_folder(options.out));
   tell(store, options);
   return store.complete() ? 0 : 1;
 }
 
-int compare(const Options& options) {
+int compare(const SweepOptions& options) {
   std::vector<report::SweepRow> rows;
   for (const std::string& folder : options.merged) {
     const SweepStore store(folder, plan_of_folder(folder));
@@ -162,7 +162,7 @@ int compare(const Options& options) {
   return 0;
 }
 
-void add_compare_command(CLI::App& sweep_app, const std::shared_ptr<Options>& options,
+void add_compare_command(CLI::App& sweep_app, const std::shared_ptr<SweepOptions>& options,
                          std::function<int()>& run) {
   CLI::App* compare_app = sweep_app.add_subcommand(
       "compare", "Tell what awareness gains from what faster code gains: one table of several sweeps");
@@ -176,7 +176,7 @@ void add_compare_command(CLI::App& sweep_app, const std::shared_ptr<Options>& op
   compare_app->callback([options, &run] { run = [options] { return compare(*options); }; });
 }
 
-void add_merge_command(CLI::App& sweep_app, const std::shared_ptr<Options>& options,
+void add_merge_command(CLI::App& sweep_app, const std::shared_ptr<SweepOptions>& options,
                        std::function<int()>& run) {
   CLI::App* merge_app =
       sweep_app.add_subcommand("merge", "Make one sweep of the folders that --shard runs wrote");
@@ -196,7 +196,7 @@ void add_merge_command(CLI::App& sweep_app, const std::shared_ptr<Options>& opti
 }  // namespace
 
 void add_sweep_command(CLI::App& app, std::function<int()>& run) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SweepOptions>();
   CLI::App* sweep_app = app.add_subcommand(
       "sweep", "Fly the paper's whole evaluation: environments x profiles x designs x seeds, in parallel");
   sweep_app->footer(

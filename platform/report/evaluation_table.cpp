@@ -12,11 +12,6 @@
 namespace roborun::report {
 namespace {
 
-double velocity(const MissionResult& r) { return r.mean_velocity_mps; }
-double mission_time(const MissionResult& r) { return r.mission_time_s; }
-double energy(const MissionResult& r) { return r.energy_kJ; }
-double latency(const MissionResult& r) { return r.latency_s.median; }
-
 std::string kernels_of(const MissionResult& r) {
   return r.map == "own" && r.planner == "own" ? "own" : fmt::format("{} + {}", r.map, r.planner);
 }

@@ -117,6 +117,12 @@ struct MissionReport {
   SafetyRecord safety;
 };
 
+/// What missions are compared by.
+[[nodiscard]] inline double velocity(const MissionResult& r) { return r.mean_velocity_mps; }
+[[nodiscard]] inline double mission_time(const MissionResult& r) { return r.mission_time_s; }
+[[nodiscard]] inline double energy(const MissionResult& r) { return r.energy_kJ; }
+[[nodiscard]] inline double latency(const MissionResult& r) { return r.latency_s.median; }
+
 /// One line. Numbers that are not finite become null.
 [[nodiscard]] std::string to_json(const MissionResult& result);
 

@@ -76,10 +76,6 @@ std::string three_digits(double value) {
   return value >= 100.0 ? fmt::format("{:.0f}", value) : fmt::format("{:.3g}", value);
 }
 
-double velocity(const MissionResult& r) { return r.mean_velocity_mps; }
-double mission_time(const MissionResult& r) { return r.mission_time_s; }
-double energy(const MissionResult& r) { return r.energy_kJ; }
-
 /// What a chart shows of a design.
 struct Bar {
   std::string title;

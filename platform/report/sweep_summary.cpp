@@ -25,10 +25,6 @@ double student_t(std::size_t degrees) {
          (5.0 * std::pow(z, 5) + 16.0 * z * z * z + 3.0 * z) / (96.0 * n * n);
 }
 
-double velocity(const MissionResult& r) { return r.mean_velocity_mps; }
-double mission_time(const MissionResult& r) { return r.mission_time_s; }
-double energy(const MissionResult& r) { return r.energy_kJ; }
-double latency(const MissionResult& r) { return r.latency_s.median; }
 double cpu_per_decision(const MissionResult& r) {
   return r.decisions > 0 ? r.cpu_s / static_cast<double>(r.decisions) : kNaN;
 }

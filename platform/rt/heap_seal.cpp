@@ -137,31 +137,31 @@ void* __libc_realloc(void* block, std::size_t size);             // NOLINT
 void* __libc_memalign(std::size_t alignment, std::size_t size);  // NOLINT
 void __libc_free(void* block);                                   // NOLINT
 
-void* malloc(std::size_t size) {
+void* malloc(std::size_t size) noexcept {
   roborun::rt::note();
   return __libc_malloc(size);
 }
-void* calloc(std::size_t count, std::size_t size) {
+void* calloc(std::size_t count, std::size_t size) noexcept {
   roborun::rt::note();
   return __libc_calloc(count, size);
 }
-void* realloc(void* block, std::size_t size) {
+void* realloc(void* block, std::size_t size) noexcept {
   roborun::rt::note();
   return __libc_realloc(block, size);
 }
-void free(void* block) {
+void free(void* block) noexcept {
   if (block != nullptr) roborun::rt::note();
   __libc_free(block);
 }
-void* aligned_alloc(std::size_t alignment, std::size_t size) {
+void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
   roborun::rt::note();
   return __libc_memalign(alignment, size);
 }
-void* memalign(std::size_t alignment, std::size_t size) {
+void* memalign(std::size_t alignment, std::size_t size) noexcept {
   roborun::rt::note();
   return __libc_memalign(alignment, size);
 }
-int posix_memalign(void** block, std::size_t alignment, std::size_t size) {
+int posix_memalign(void** block, std::size_t alignment, std::size_t size) noexcept {
   roborun::rt::note();
   if (alignment % sizeof(void*) != 0 || (alignment & (alignment - 1)) != 0) return EINVAL;
   void* got = __libc_memalign(alignment, size);

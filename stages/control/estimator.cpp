@@ -7,7 +7,6 @@
 namespace roborun::stages {
 namespace {
 
-constexpr double kGravity_mps2 = 9.81;
 constexpr int kCovarianceEvery = 4;
 constexpr int kPosition = 0;
 constexpr int kVelocity = 3;
@@ -57,7 +56,7 @@ Status Estimator::predict(const firmware_if::ImuSample& sample) noexcept {
   state_.w_WB_B = gyro_B - gyro_bias_B_;
   state_.q_WB = (state_.q_WB * small_rotation(dt_s * state_.w_WB_B)).normalized();
   force_W_ = state_.q_WB.toRotationMatrix() * (force_B - accel_bias_B_);
-  const Vector3 a_W = force_W_ - Vector3(0.0, 0.0, kGravity_mps2);
+  const Vector3 a_W = force_W_ - Vector3(0.0, 0.0, core::kGravity_mps2);
   state_.p_WB += dt_s * state_.v_WB + (0.5 * dt_s * dt_s) * a_W;
   state_.v_WB += dt_s * a_W;
 
@@ -127,7 +126,7 @@ void Estimator::start(const firmware_if::GnssFix& fix) noexcept {
   state_.q_WB = (Quaternion(half.cos, 0.0, 0.0, half.sin) * level).normalized();
   gyro_bias_B_.setZero();
   accel_bias_B_.setZero();
-  force_W_ = Vector3(0.0, 0.0, kGravity_mps2);
+  force_W_ = Vector3(0.0, 0.0, core::kGravity_mps2);
   P_.setZero();
   for (int i = 0; i < 3; ++i) {
     P_(kPosition + i, kPosition + i) = 0.05 * 0.05;

@@ -8,8 +8,6 @@
 namespace roborun::stages {
 namespace {
 
-constexpr double kGravity_mps2 = 9.81;
-
 Vector3 clamp_norm(const Vector3& v, double limit) noexcept {
   const double norm = v.norm();
   return norm > limit ? Vector3(v * (limit / norm)) : v;
@@ -26,9 +24,9 @@ Vector3 Tracker::acceleration_W(const Input& in) noexcept {
                  config_.integral_limit_mps2);
   Vector3 a_W = in.reference.a_W + config_.velocity_gain_Hz * error_W_mps + integral_W_mps2_;
   // Never ask for less than half of hover thrust: attitude needs something to work with.
-  a_W.z() = std::clamp(a_W.z(), -0.5 * kGravity_mps2, 0.6 * kGravity_mps2);
+  a_W.z() = std::clamp(a_W.z(), -0.5 * core::kGravity_mps2, 0.6 * core::kGravity_mps2);
   const core::SinCos tilt = core::sin_cos(config_.tilt_limit_rad);
-  const double side_limit = (kGravity_mps2 + a_W.z()) * tilt.sin / tilt.cos;
+  const double side_limit = (core::kGravity_mps2 + a_W.z()) * tilt.sin / tilt.cos;
   const double side = core::hypot2(a_W.x(), a_W.y());
   if (side > side_limit) {
     a_W.x() *= side_limit / side;
@@ -49,7 +47,7 @@ Status Tracker::step(const Input& in, firmware_if::MotorCommand& out) noexcept {
   }
   ++counters_.steps;
   const Airframe& airframe = config_.airframe;
-  const Vector3 force_W = acceleration_W(in) + Vector3(0.0, 0.0, kGravity_mps2);
+  const Vector3 force_W = acceleration_W(in) + Vector3(0.0, 0.0, core::kGravity_mps2);
   const Matrix3 R_WB = in.state.q_WB.toRotationMatrix();
 
   const core::SinCos yaw = core::sin_cos(core::wrap_angle(in.yaw_rad));

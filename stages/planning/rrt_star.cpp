@@ -12,7 +12,6 @@ namespace {
 constexpr double kVisitedCell_m = 4.8;
 constexpr double kVisitedCell_m3 = kVisitedCell_m * kVisitedCell_m * kVisitedCell_m;
 constexpr double kGoalBias = 0.15;
-constexpr double kShortEdge_m = 0.3;  // a node nearer than this to another adds nothing
 constexpr double kEscape_m = 2.0;
 constexpr std::uint64_t kSpare = 4096;  // lookups that are granted whatever the budget says
 constexpr double kLookAhead_m = 12.0;   // beyond a path's end

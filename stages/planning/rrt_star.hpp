@@ -56,6 +56,7 @@ class RrtStar final : public Planner {
  private:
   static constexpr std::size_t kVisited = 8192;
   static constexpr std::size_t kNeighbours = 12;
+  static constexpr double kShortEdge_m = 0.3;  ///< A node nearer than this to another adds nothing.
   struct Node {
     Vector3 p_W = Vector3::Zero();
     double cost_m{};  ///< Along the tree, always up to date.

@@ -7,7 +7,6 @@
 namespace roborun::stages {
 namespace {
 
-constexpr double kShortEdge_m = 0.3;
 constexpr std::uint32_t kFirstRounds = 600;  // without a way to the goal after which it counts as walled in
 constexpr std::uint32_t kSidestepRounds = 24;
 constexpr double kSlack = 1.03;  // a path of the tree may be so much longer than one pulled tight

@@ -46,7 +46,7 @@ void NavigationSensors::sample_imu(const VehicleState& state) noexcept {
   firmware_if::ImuSample s;
   s.stamp = now_;
   s.sequence = ++imu_sequence_;
-  const Vector3 force_W = state.a_WB + Vector3(0.0, 0.0, kGravity_mps2);
+  const Vector3 force_W = state.a_WB + Vector3(0.0, 0.0, core::kGravity_mps2);
   const Vector3 gyro = state.w_WB_B + gyro_bias_B_radps_ + normal3(imu_rng_, config_.gyro_noise_radps);
   const Vector3 force = state.q_WB.toRotationMatrix().transpose() * force_W + accel_bias_B_mps2_ +
                         normal3(imu_rng_, config_.accel_noise_mps2);

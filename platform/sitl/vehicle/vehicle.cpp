@@ -55,7 +55,7 @@ void Vehicle::substep(double dt_s) noexcept {
   const Vector3 air_W_mps = s.v_WB - wind_W_mps_;
   const Vector3 drag_W_N =
       -(config_.drag_linear_Nspm + config_.drag_quadratic_Ns2pm2 * air_W_mps.norm()) * air_W_mps;
-  s.a_WB = (R_WB.col(2) * total_N + drag_W_N) / config_.mass_kg - Vector3(0.0, 0.0, kGravity_mps2);
+  s.a_WB = (R_WB.col(2) * total_N + drag_W_N) / config_.mass_kg - Vector3(0.0, 0.0, core::kGravity_mps2);
 
   // Front left, front right, rear left, rear right; front left and rear right push the body
   // counter-clockwise.

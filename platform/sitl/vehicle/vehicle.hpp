@@ -11,8 +11,6 @@
 
 namespace roborun::sitl {
 
-inline constexpr double kGravity_mps2 = 9.81;
-
 struct VehicleConfig {
   double mass_kg{4.5};                        ///< [0.5, 50]. With the span below: hovers at about 515 W.
   Vector3 inertia_kgm2{0.080, 0.080, 0.140};  ///< About the body axes.

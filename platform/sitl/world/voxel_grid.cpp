@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace roborun::sitl {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::int64_t index_of(double p_m, double min_m, double cell_m) noexcept {
   const double raw = std::floor((p_m - min_m) / cell_m);

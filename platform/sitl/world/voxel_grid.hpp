@@ -3,11 +3,15 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "core/geometry/vector.hpp"
 
 namespace roborun::sitl {
+
+/// How far away what a ray does not hit is.
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 class VoxelGrid {
  public:

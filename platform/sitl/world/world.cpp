@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/geometry/math.hpp"
 #include "platform/sitl/world/input_error.hpp"
@@ -13,7 +12,6 @@ namespace roborun::sitl {
 namespace {
 
 constexpr double kColumn_m = 5.0;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double hit_pillar_m(const Pillar& pillar, const Vector3& o, const Vector3& d) noexcept {
   const double ox = o.x() - pillar.x_m;

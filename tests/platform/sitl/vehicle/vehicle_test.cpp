@@ -4,6 +4,8 @@
 
 #include <limits>
 
+#include "core/geometry/math.hpp"
+
 namespace roborun::sitl {
 namespace {
 
@@ -11,7 +13,9 @@ constexpr Nanos kFrame{2'500'000};
 
 firmware_if::MotorCommand all(double ratio) { return {{ratio, ratio, ratio, ratio}}; }
 
-double hover_ratio(const VehicleConfig& c) { return c.mass_kg * kGravity_mps2 / (4.0 * c.max_thrust_N); }
+double hover_ratio(const VehicleConfig& c) {
+  return c.mass_kg * core::kGravity_mps2 / (4.0 * c.max_thrust_N);
+}
 
 WindConfig calm() { return {Vector3::Zero(), 0.0, 3.0}; }
 
@@ -39,7 +43,7 @@ TEST(Vehicle, DragGivesFreeFallAnEnd) {
   // m g = linear v + quadratic v^2
   const double a = config.drag_quadratic_Ns2pm2;
   const double b = config.drag_linear_Nspm;
-  const double c = config.mass_kg * kGravity_mps2;
+  const double c = config.mass_kg * core::kGravity_mps2;
   const double wanted = (-b + std::sqrt(b * b + 4.0 * a * c)) / (2.0 * a);
   EXPECT_NEAR(-vehicle.state().v_WB.z(), wanted, 0.1);
 }
