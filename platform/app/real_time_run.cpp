@@ -262,15 +262,18 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
   {
     const Load load(config_.load);
     const std::uint64_t heap_before = rt::sealed_heap_calls();
+    const auto begin = std::chrono::steady_clock::now();
+    const auto passed_s = [begin] {
+      return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    };
     start_threads();
     rt::ServiceNotifier service;
     (void)service.tell("READY=1");
     report.locked_bytes = rt::locked_bytes();
-    const auto begin = std::chrono::steady_clock::now();
     double told_s = 0.0;
     while (report.seconds < config_.seconds && !reactions_.stopping()) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
-      report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      report.seconds = passed_s();
       collect_trace();
       if (!lane_[0].overdue(clock_.now())) (void)service.tell("WATCHDOG=1");
       if (progress && report.seconds >= told_s + 1.0) progress(told_s = report.seconds);
@@ -278,6 +281,7 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
     for (rt::LaneThread& thread : thread_) thread.request_stop();
     over_.store(true, std::memory_order_relaxed);
     for (rt::LaneThread& thread : thread_) thread.join();
+    report.seconds = passed_s();
     rt::seal_heap(rt::HeapSeal::kOpen);
     report.heap_calls_after_start = rt::sealed_heap_calls() - heap_before;
   }
