@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "platform/sitl/world/input_error.hpp"
@@ -35,23 +36,24 @@ struct Header {
 }
 
 Header parse_header(std::span<const unsigned char> bytes, bool full, const std::string& name) {
-  const std::string magic = full ? "# Octomap OcTree file" : "# Octomap OcTree binary file";
+  constexpr std::size_t kLongestLine = 512;
+  const std::string_view magic = full ? "# Octomap OcTree file" : "# Octomap OcTree binary file";
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   const auto line_at = [&](std::size_t& at) {
-    std::string line;
-    while (at < bytes.size() && bytes[at] != '\n' && line.size() < 512)
-      line.push_back(static_cast<char>(bytes[at++]));
-    if (at >= bytes.size() || bytes[at] != '\n')
+    const std::string_view rest = text.substr(at, kLongestLine + 1);
+    const std::size_t end = rest.find('\n');
+    if (end == std::string_view::npos)
       refuse(name, "truncated OctoMap header: must hold id, size, res and data lines");
-    ++at;
-    return line;
+    at += end + 1;
+    return rest.substr(0, end);
   };
   std::size_t at = 0;
-  if (line_at(at).rfind(magic, 0) != 0)
+  if (!line_at(at).starts_with(magic))
     refuse(name, fmt::format("not an OctoMap file: line 1 must be '{}'", magic));
   Header header;
   bool id_ok = false;
   for (int i = 0; i < 64; ++i) {
-    const std::string line = line_at(at);
+    const std::string_view line = line_at(at);
     if (line == "data") {
       header.data = at;
       if (!id_ok) refuse(name, "OctoMap header without 'id OcTree'");
@@ -59,80 +61,77 @@ Header parse_header(std::span<const unsigned char> bytes, bool full, const std::
         refuse(name, "OctoMap header: res must be 0.001 .. 100 m");
       return header;
     }
-    if (line.rfind("id ", 0) == 0) {
+    if (line.starts_with("id ")) {
       if (line != "id OcTree")
         refuse(name, fmt::format("OctoMap tree of type '{}': only OcTree is read", line.substr(3)));
       id_ok = true;
-    } else if (line.rfind("res ", 0) == 0) {
-      header.resolution_m = std::strtod(line.c_str() + 4, nullptr);
+    } else if (line.starts_with("res ")) {
+      (void)std::from_chars(line.data() + 4, line.data() + line.size(), header.resolution_m);
     }
   }
   refuse(name, "OctoMap header too long: no 'data' line");
 }
 
 /// Walks the tree in file order with an explicit stack and calls on_leaf(leaf, occupied).
-template <typename LeafFunction>
-void walk(std::span<const unsigned char> data, bool full, const std::string& name, LeafFunction&& on_leaf) {
-  struct Frame {
+template <bool kFull, typename LeafFunction>
+void walk_as(std::span<const unsigned char> data, const std::string& name, LeafFunction&& on_leaf) {
+  constexpr int kChildBits = kFull ? 1 : 2;  // .bt: 1 free, 2 occupied, 3 inner; .ot: whether there is one
+  constexpr unsigned kInner = 3;
+  struct Node {
     std::uint64_t morton;
-    int depth;
-    unsigned rest;  // children still to come; .bt: two bits a child; .ot: one bit a child
+    unsigned rest;  // children still to come
+    int level;      // of the children: cubes of 2^level cells a side
   };
   std::size_t at = 0;
-  const auto need = [&](std::size_t count) {
-    if (data.size() - at < count) refuse(name, fmt::format("truncated OctoMap data at byte {}", at));
-  };
   float value = 0.0F;
-  const auto read_node = [&](unsigned& children) {
-    if (full) {
-      need(5);
-      std::memcpy(&value, data.data() + at, 4);
-      children = data[at + 4];
-      at += 5;
+  const auto read_children = [&]() -> unsigned {
+    constexpr std::size_t kBytes = kFull ? 5 : 2;
+    if (data.size() - at < kBytes) refuse(name, fmt::format("truncated OctoMap data at byte {}", at));
+    const unsigned char* const from = data.data() + at;
+    at += kBytes;
+    if constexpr (kFull) {
+      std::memcpy(&value, from, sizeof value);
+      return from[4];
     } else {
-      need(2);
-      children = static_cast<unsigned>(data[at]) | (static_cast<unsigned>(data[at + 1]) << 8U);
-      at += 2;
+      return from[0] | static_cast<unsigned>(from[1]) << 8U;
     }
   };
-  std::array<Frame, kDepth + 1> stack{};
-  int top = 0;
-  unsigned root = 0;
   if (data.empty()) return;
-  read_node(root);
-  stack[0] = {0, 0, root};
-  if (full && root == 0) on_leaf(Leaf{0, std::int64_t{1} << kDepth}, value > 0.0F);
-  while (top >= 0) {
-    Frame& frame = stack[static_cast<std::size_t>(top)];
-    if (frame.rest == 0) {
-      --top;
-      continue;
+  std::array<Node, kDepth> waiting;  // parents with children to come: each is one level above the next
+  std::size_t waiting_count = 0;
+  Node node{0, read_children(), kDepth - 1};
+  if (kFull && node.rest == 0) on_leaf(Leaf{0, std::int64_t{1} << kDepth}, value > 0.0F);
+  for (;;) {
+    while (node.rest != 0) {
+      const int child = std::countr_zero(node.rest) / kChildBits;  // its digit of the Morton index
+      const unsigned code = kFull ? kInner : node.rest >> (2 * child) & 3U;
+      node.rest &= ~(((1U << kChildBits) - 1U) << (kChildBits * child));
+      const std::uint64_t morton = node.morton + (static_cast<std::uint64_t>(child) << (3 * node.level));
+      const Leaf leaf{morton, std::int64_t{1} << node.level};
+      if (code != kInner) {
+        on_leaf(leaf, code == 2U);
+        continue;
+      }
+      if (!kFull && node.level == 0) refuse(name, "OctoMap data deeper than 16 levels");
+      const unsigned children = read_children();
+      if (kFull && children == 0) {
+        on_leaf(leaf, value > 0.0F);
+        continue;
+      }
+      if (node.level == 0) refuse(name, "OctoMap data deeper than 16 levels");
+      if (node.rest != 0) waiting[waiting_count++] = node;
+      node = {morton, children, node.level - 1};
     }
-    const auto child = static_cast<unsigned>(
-                           std::countr_zero(full ? frame.rest : (frame.rest | frame.rest >> 1U) & 0x5555U)) /
-                       (full ? 1U : 2U);
-    const unsigned code = full ? 3U : (frame.rest >> (2U * child)) & 3U;  // .bt: 1 free, 2 occupied, 3 inner
-    frame.rest &= ~(full ? 1U << child : 3U << (2U * child));
-    const int depth = frame.depth + 1;
-    const std::int64_t size = std::int64_t{1} << (kDepth - depth);
-    // The number of a child is its digit of the Morton index.
-    const std::uint64_t morton = frame.morton + (std::uint64_t{child} << (3 * (kDepth - depth)));
-    if (code != 3U) {
-      on_leaf(Leaf{morton, size}, code == 2U);
-      continue;
-    }
-    if (!full && depth >= kDepth) refuse(name, "OctoMap data deeper than 16 levels");
-    unsigned children = 0;
-    read_node(children);
-    if (full && children == 0) {
-      on_leaf(Leaf{morton, size}, value > 0.0F);
-      continue;
-    }
-    if (depth == kDepth) refuse(name, "OctoMap data deeper than 16 levels");
-    stack[static_cast<std::size_t>(++top)] = {morton, depth, children};
+    if (waiting_count == 0) break;
+    node = waiting[--waiting_count];
   }
   if (at != data.size())
     refuse(name, fmt::format("{} bytes after the end of the OctoMap tree", data.size() - at));
+}
+
+template <typename LeafFunction>
+void walk(std::span<const unsigned char> data, bool full, const std::string& name, LeafFunction&& on_leaf) {
+  return full ? walk_as<true>(data, name, on_leaf) : walk_as<false>(data, name, on_leaf);
 }
 
 }  // namespace
@@ -141,6 +140,7 @@ OctomapLeaves read_octomap(std::span<const unsigned char> bytes, bool full, cons
   const Header header = parse_header(bytes, full, name);
   OctomapLeaves map;
   map.resolution_m = header.resolution_m;
+  map.leaves.reserve(bytes.size() / 8);  // about as many as a sparse tree has
   // File order is Morton order, because children come by number: x, then y, then z.
   walk(bytes.subspan(header.data), full, name, [&](const Leaf& leaf, bool occupied) {
     map.leaves.push_back({leaf.morton, static_cast<std::int32_t>(leaf.size), occupied});
