@@ -5,9 +5,9 @@
 /// a block behind the surface is left alone, the rest is divided until cells of p0. Surfaces are the pixels'
 /// end points, written at the finest level whatever p0 is: what a coarse block around them hides stays
 /// unknown, hence not free, until a finer look clears it. Only where p0 is a brick (4.8 m) or more, and where
-/// nothing is known, it is enough to note that a brick of which nothing is known has a surface: unknown is not
-/// free either. Free evidence is written first, surfaces after it, so that a look past a cell never erases a
-/// surface seen in the same scan.
+/// nothing is known, it is enough to note that a brick of which nothing is known has a surface: unknown is
+/// not free either. Free evidence is written first, surfaces after it, so that a look past a cell never
+/// erases a surface seen in the same scan.
 #pragma once
 
 #include <array>

@@ -356,7 +356,7 @@ void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image,
         static_cast<float>(0.5 * tile_pitch * (std::fabs(R(axis, 1)) + std::fabs(R(axis, 2))) / kTileCell_m);
   }
   const DepthPyramid::Entry* entry = pairs.entry;
-  for (std::size_t v = 0; v < frame.height; v += side, entry += 2 * pairs.width) {
+  for (std::size_t v = 0; v < frame.height; v += side, entry += 2 * static_cast<std::size_t>(pairs.width)) {
     const double half = 0.5 * static_cast<double>(side);
     line.first = direction(camera, half, static_cast<double>(v) + half, kTileCell_m);
     tile_boxes(line, {entry, 2, columns}, tiles_);
