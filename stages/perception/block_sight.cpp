@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "core/precision.hpp"
 #include "stages/perception/block_sight.hpp"
@@ -30,9 +31,19 @@ struct Lanes {
   alignas(32) float z[8];
 };
 
+/// One bit a block.
+template <class Bits>
 struct Marks {
-  unsigned free{0}, mixed{0}, blocked{0}, outside{0}, covered{0};
+  Bits free{0}, mixed{0}, blocked{0}, outside{0}, covered{0};
 };
+
+/// Seen as free by one camera and as hidden by another that sees all of it: they disagree, and always will.
+template <class Bits, class Result>
+HWY_INLINE void decide(const Marks<Bits>& marks, bool complete, Result& result) {
+  const Bits covered = complete ? ~Bits{0} : marks.covered;
+  result.free = marks.free & ~marks.mixed & ~marks.blocked & covered;
+  result.mixed = (marks.mixed | (marks.free & ~covered)) & ~marks.blocked;
+}
 
 struct Rectangles {
   alignas(32) std::int32_t u0[8];
@@ -83,6 +94,25 @@ HWY_INLINE V half_width(const SightCamera& c, std::size_t row, V tangent, V half
   return hn::Mul(sum, half_over_near);
 }
 
+/// How deep the best corner of a cube is within the sides of the field of view; with -half_m the worst one.
+template <class V>
+HWY_INLINE V inside_view(const SightCamera& c, float half_m, V x, V y, V z) {
+  const Floats d;
+  const auto support = [&](std::size_t side) { return hn::Set(d, half_m * c.support[side]); };
+  const V side = hn::Mul(x, hn::Set(d, c.tan_half));
+  const V across = hn::Min(hn::Add(hn::Sub(side, y), support(0)), hn::Add(hn::Add(side, y), support(1)));
+  const V along = hn::Min(hn::Add(hn::Sub(side, z), support(2)), hn::Add(hn::Add(side, z), support(3)));
+  return hn::Min(across, along);
+}
+
+/// Cubes of which the camera sees nothing.
+template <class V>
+HWY_INLINE auto out_of_view(const SightCamera& c, float half_m, V x, V y, V z) {
+  const Floats d;
+  const V far = hn::Add(x, hn::Set(d, half_m * c.extent));
+  return hn::Or(hn::Le(inside_view(c, half_m, x, y, z), hn::Zero(d)), hn::Le(far, hn::Set(d, kNear_m)));
+}
+
 template <class V>
 HWY_INLINE void store_pixels(V low, V high, float scale, float last, V keep, std::int32_t* first,
                              std::int32_t* end) {
@@ -96,7 +126,7 @@ HWY_INLINE void store_pixels(V low, V high, float scale, float last, V keep, std
   hn::Store(pixel(high), Ints(), end);
 }
 
-HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Marks& marks) {
+HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Marks<unsigned>& marks) {
   const Floats d;
   const Ints di;
   Rectangles r;
@@ -110,21 +140,12 @@ HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Ma
     const auto reach = set(half_m * c.extent);
     const auto far = hn::Add(x, reach);
     const auto near = hn::Sub(x, reach);
-    const auto side = hn::Mul(x, set(c.tan_half));
-    const auto left = hn::Sub(side, y), right = hn::Add(side, y);
-    const auto up = hn::Sub(side, z), down = hn::Add(side, z);
-    const auto s0 = set(half_m * c.support[0]), s1 = set(half_m * c.support[1]);
-    const auto s2 = set(half_m * c.support[2]), s3 = set(half_m * c.support[3]);
     const auto zero = hn::Zero(d);
-    const auto seen =
-        hn::Min(hn::Min(hn::Add(left, s0), hn::Add(right, s1)), hn::Min(hn::Add(up, s2), hn::Add(down, s3)));
-    const auto all =
-        hn::Min(hn::Min(hn::Sub(left, s0), hn::Sub(right, s1)), hn::Min(hn::Sub(up, s2), hn::Sub(down, s3)));
-    const auto is_outside = hn::Or(hn::Le(seen, zero), hn::Le(far, set(kNear_m)));
+    const auto is_outside = out_of_view(c, half_m, x, y, z);
     const auto is_straddling = hn::Le(near, set(kNear_m));
     outside |= bits_of(is_outside) << i;
     straddling |= bits_of(is_straddling) << i;
-    inside |= bits_of(hn::Ge(all, zero)) << i;
+    inside |= bits_of(hn::Ge(inside_view(c, -half_m, x, y, z), zero)) << i;
     const auto skip = hn::Or(is_outside, is_straddling);
     const auto keep = hn::IfThenZeroElse(skip, hn::BitCast(d, hn::Set(di, -1)));
     const auto depth = hn::IfThenElse(skip, set(1.0F), x);
@@ -203,20 +224,21 @@ struct Combined {
   std::array<unsigned, kMaxCameras> outside;
 };
 
+HWY_INLINE float half_edge_m(int level) {
+  return static_cast<float>((level == 0 ? kCore : 1.0) * 0.5 * cell_size_m(level));
+}
+
 /// Eight blocks, with their positions in the frame of each camera of the set.
 HWY_INLINE void combine(const SightCameras& cameras, unsigned set, int level, const Lanes* at,
                         Combined& result) {
-  const auto half_m = static_cast<float>((level == 0 ? kCore : 1.0) * 0.5 * cell_size_m(level));
-  Marks marks;
+  const float half_m = half_edge_m(level);
+  Marks<unsigned> marks;
   for (unsigned rest = set; rest != 0; rest &= rest - 1) {
     const auto k = static_cast<std::size_t>(__builtin_ctz(rest));
     see_with(cameras.camera[k], half_m, at[k], marks);
     result.outside[k] = marks.outside;
   }
-  // Seen as free by one camera and as hidden by another that sees all of it: they disagree, and always will.
-  const unsigned covered = cameras.complete ? 0xFFU : marks.covered;
-  result.free = marks.free & ~marks.mixed & ~marks.blocked & covered;
-  result.mixed = (marks.mixed | (marks.free & ~covered)) & ~marks.blocked;
+  decide(marks, cameras.complete, result);
 }
 
 /// The cameras of the set that can see some of block i.
@@ -277,20 +299,75 @@ HWY_INLINE Node node_of(const SightCameras& cameras, const SightBlock& block) {
   return node;
 }
 
-EightSeen see_blocks_lanes(const SightCameras& cameras, int level, const std::array<Vector3, 8>& center_W) {
-  Lanes at[kMaxCameras];
+/// Eight blocks in the frame of a camera: center_W by axis.
+HWY_INLINE void place_blocks(const SightCamera& c, const std::array<const double*, 3>& center_W, Lanes& at) {
+  const Floats d;
+  float* const lane[3] = {at.x, at.y, at.z};
+  alignas(32) float offset[3][8];
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (std::size_t i = 0; i < 8; ++i)
+      offset[axis][i] = static_cast<float>(center_W[axis][i] - c.p_WC[static_cast<Eigen::Index>(axis)]);
+  for (std::size_t row = 0; row < 3; ++row) {
+    const auto turned = [&](std::size_t axis, std::size_t i) {
+      return hn::Mul(hn::Set(d, c.R_CW[3 * row + axis]), hn::Load(d, offset[axis] + i));
+    };
+    for (std::size_t i = 0; i < 8; i += hn::Lanes(d))
+      hn::Store(hn::Add(hn::Add(turned(0, i), turned(1, i)), turned(2, i)), d, lane[row] + i);
+  }
+}
+
+void see_blocks_lanes(const SightCameras& cameras, int level, std::span<const Vector3> center_W,
+                      BlocksSeen& seen) {
+  const Floats d;
+  const float half_m = half_edge_m(level);
+  const std::size_t count = std::min(center_W.size(), BlocksSeen::kMost);
+  alignas(32) double axis_W[3][BlocksSeen::kMost];
+  for (std::size_t i = 0; i < (count + 7) / 8 * 8; ++i)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      axis_W[axis][i] = center_W[std::min(i, count - 1)][static_cast<Eigen::Index>(axis)];
+  seen.cameras.fill(0);
+  Marks<std::uint64_t> marks;
   for (std::size_t k = 0; k < cameras.count; ++k) {
-    for (std::size_t i = 0; i < 8; ++i) {
-      const std::array<float, 3> p_C = in_camera(cameras.camera[k], center_W[i]);
-      at[k].x[i] = p_C[0];
-      at[k].y[i] = p_C[1];
-      at[k].z[i] = p_C[2];
+    const SightCamera& c = cameras.camera[k];
+    Lanes at[BlocksSeen::kMost / 8];
+    std::array<std::uint8_t, BlocksSeen::kMost + 8> in_view;
+    std::size_t in_view_count = 0;
+    for (std::size_t first = 0; first < count; first += 8) {
+      Lanes& eight = at[first / 8];
+      place_blocks(c, {axis_W[0] + first, axis_W[1] + first, axis_W[2] + first}, eight);
+      unsigned outside = 0;
+      for (std::size_t i = 0; i < 8; i += hn::Lanes(d))
+        outside |= bits_of(out_of_view(c, half_m, hn::Load(d, eight.x + i), hn::Load(d, eight.y + i),
+                                       hn::Load(d, eight.z + i)))
+                   << i;
+      for (unsigned bits = ~outside & 0xFFU; bits != 0; bits &= bits - 1)
+        in_view[in_view_count++] =
+            static_cast<std::uint8_t>(first + static_cast<std::size_t>(__builtin_ctz(bits)));
+    }
+    if (in_view_count == 0) continue;
+    for (std::size_t i = 0; i < 8; ++i) in_view[in_view_count + i] = in_view[in_view_count - 1];
+    for (std::size_t first = 0; first < in_view_count; first += 8) {
+      Lanes eight;
+      for (std::size_t i = 0; i < 8; ++i) {
+        const std::size_t block = in_view[first + i];
+        eight.x[i] = at[block / 8].x[block % 8];
+        eight.y[i] = at[block / 8].y[block % 8];
+        eight.z[i] = at[block / 8].z[block % 8];
+        seen.cameras[block] = static_cast<std::uint8_t>(seen.cameras[block] | 1U << k);
+      }
+      Marks<unsigned> here;
+      see_with(c, half_m, eight, here);
+      const auto spread = [&](unsigned bits, std::uint64_t& to) {
+        for (; bits != 0; bits &= bits - 1)
+          to |= std::uint64_t{1} << in_view[first + static_cast<std::size_t>(__builtin_ctz(bits))];
+      };
+      spread(here.free, marks.free);
+      spread(here.mixed, marks.mixed);
+      spread(here.blocked, marks.blocked);
+      spread(here.covered, marks.covered);
     }
   }
-  const unsigned all = (1U << cameras.count) - 1U;
-  Combined combined;
-  combine(cameras, all, level, at, combined);
-  return summary(combined, all);
+  decide(marks, cameras.complete, seen);
 }
 
 EightSeen see_children_lanes(const SightCameras& cameras, const SightBlock& parent) {
@@ -390,15 +467,31 @@ void end_cells_lanes(const PixelLine& line, std::span<const float> depth_m, floa
   }
 }
 
-bool tile_steps_lanes(const DepthStrip& strip, int shift, DepthPyramid::Entry* entry) {
+/// to[i] = the least of two entries, from[2 i] and from[2 i + 1]; one vector of them.
+HWY_INLINE void least_of_pairs(const std::int32_t* from, std::int32_t* to) {
+#if HWY_TARGET == HWY_SCALAR
+  const std::int32_t a = from[0], b = from[1];
+  *to = std::min(a & 0xFFFF, b & 0xFFFF) | (std::min(a >> 16U, b >> 16U) << 16U);
+#else
+  const Ints di;
+  const hn::Repartition<std::int16_t, Ints> d16;
+  const auto low = hn::LoadU(di, from), high = hn::LoadU(di, from + hn::Lanes(di));
+  const auto even = hn::BitCast(d16, hn::ConcatEven(di, high, low));
+  const auto odd = hn::BitCast(d16, hn::ConcatOdd(di, high, low));
+  hn::StoreU(hn::BitCast(di, hn::Min(even, odd)), di, to);
+#endif
+}
+
+StripSeen tile_steps_lanes(const DepthStrip& strip, int shift, DepthPyramid::Entry* entry) {
   const Floats d;
   const Ints di;
   const std::size_t lanes = hn::Lanes(d);
   const auto range = hn::Set(d, strip.range_m), scale = hn::Set(d, strip.steps_per_m);
   const auto all = hn::Set(di, DepthPyramid::kMaxSteps), one = hn::Set(di, 1);
   const auto none = hn::Set(d, 2.0F * kMaxRange_m);
-  alignas(32) std::int32_t column[DepthPyramid::kMaxPixels + 8];
-  bool complete = true;
+  constexpr std::size_t kBeyond = 24;
+  alignas(32) std::int32_t column[DepthPyramid::kMaxPixels + 8 + kBeyond];
+  StripSeen seen{true, false};
   const auto some = [&](const float* depth, std::size_t stride, std::size_t u) {
     // Steps grow with depth, so that the least and the most can be found first. No information: no part.
     auto least = none, most = hn::Zero(d);
@@ -410,7 +503,8 @@ bool tile_steps_lanes(const DepthStrip& strip, int shift, DepthPyramid::Entry* e
       least = hn::Min(least, hn::IfThenElse(known_here, raw, none));
       most = hn::Max(most, hn::IfThenElseZero(known_here, raw));
     }
-    complete = complete && hn::AllTrue(d, known);
+    seen.complete = seen.complete && hn::AllTrue(d, known);
+    seen.surface = seen.surface || !hn::AllFalse(d, hn::Lt(least, range));
     const auto steps = [&](auto z) { return hn::ConvertTo(di, hn::Mul(hn::Min(z, range), scale)); };
     const auto within = [&](auto z) { return hn::RebindMask(di, hn::Lt(z, range)); };
     const auto least_steps = hn::IfThenElse(within(least), steps(least), all);
@@ -428,16 +522,17 @@ bool tile_steps_lanes(const DepthStrip& strip, int shift, DepthPyramid::Entry* e
         tail[8 * v + i] = strip.depth_m[v * strip.width + std::min(u + i, strip.width - 1)];
     some(tail, 8, u);
   }
-  const std::size_t side = std::size_t{1} << static_cast<unsigned>(shift);
-  for (std::size_t x = 0; x * side < strip.width; ++x) {
-    std::int32_t least = DepthPyramid::kMaxSteps, not_most = DepthPyramid::kMaxSteps;
-    for (std::size_t i = x * side; i < std::min((x + 1) * side, strip.width); ++i) {
-      least = std::min(least, column[i] & 0xFFFF);
-      not_most = std::min(not_most, column[i] >> 16);
-    }
-    entry[x] = {static_cast<std::int16_t>(least), static_cast<std::int16_t>(not_most)};
+  // Neighbours in pairs, until a column is a tile. Beyond the last one stands what no minimum notices.
+  const std::size_t tiles =
+      (strip.width + (std::size_t{1} << static_cast<unsigned>(shift)) - 1) >> static_cast<unsigned>(shift);
+  const std::size_t stored = (strip.width + lanes - 1) / lanes * lanes;
+  std::fill_n(column + stored, kBeyond, DepthPyramid::kMaxSteps | (DepthPyramid::kMaxSteps << 16U));
+  for (unsigned k = 1; k <= static_cast<unsigned>(shift); ++k) {
+    const std::size_t count = tiles << (static_cast<unsigned>(shift) - k);
+    for (std::size_t x = 0; x < count; x += lanes) least_of_pairs(column + 2 * x, column + x);
   }
-  return complete;
+  std::memcpy(entry, column, tiles * sizeof(DepthPyramid::Entry));
+  return seen;
 }
 
 PixelCounts pixel_counts_lanes(std::span<const float> depth_m, float range_m) {
@@ -463,17 +558,16 @@ PixelCounts pixel_counts_lanes(std::span<const float> depth_m, float range_m) {
   return counts;
 }
 
-void tile_boxes_lanes(const TileLine& line, const DepthPyramid::Entry* entry, std::size_t count,
-                      TileRow& row) {
+void tile_boxes_lanes(const TileLine& line, const TileEntries& tiles, TileRow& row) {
   const Floats d;
   const Ints di;
   constexpr float kBias = 4096.0F;    // makes truncation round down
-  constexpr float kRounding = 1e-3F;  // of a brick
+  constexpr float kRounding = 4e-3F;  // of a cell
   const auto m_per_step = hn::Set(d, 1.0F / line.steps_per_m);
-  for (std::size_t x = 0; x < count; x += hn::Lanes(d)) {
+  for (std::size_t x = 0; x < tiles.count; x += hn::Lanes(d)) {
     alignas(32) std::int32_t raw[8] = {};
     for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-      const DepthPyramid::Entry& e = entry[std::min(x + i, count - 1)];
+      const DepthPyramid::Entry& e = tiles.entry[tiles.stride * std::min(x + i, tiles.count - 1)];
       raw[i] = e.least_steps | (static_cast<std::int32_t>(e.not_most_steps) << 16U);
       row.surface[x + i] = e.least_steps < DepthPyramid::kMaxSteps;
     }
@@ -486,15 +580,15 @@ void tile_boxes_lanes(const TileLine& line, const DepthPyramid::Entry* entry, st
       const auto center = hn::Add(hn::Set(d, line.first[axis]), hn::Mul(column, hn::Set(d, line.step[axis])));
       const auto half = hn::Set(d, line.half[axis]);
       const auto low = hn::Sub(center, half), high = hn::Add(center, half);
-      const auto brick = [&](auto offset, float margin) {
+      const auto cell = [&](auto offset, float margin) {
         return hn::Add(hn::ConvertTo(di, hn::Add(offset, hn::Set(d, line.rest[axis] + kBias + margin))),
                        hn::Set(di, line.origin[axis] - static_cast<std::int32_t>(kBias)));
       };
-      hn::Store(brick(hn::Min(hn::Mul(low, near), hn::Mul(low, far)), -kRounding), di,
+      hn::Store(cell(hn::Min(hn::Mul(low, near), hn::Mul(low, far)), -kRounding), di,
                 row.low[axis].data() + x);
-      hn::Store(brick(hn::Max(hn::Mul(high, near), hn::Mul(high, far)), kRounding), di,
+      hn::Store(cell(hn::Max(hn::Mul(high, near), hn::Mul(high, far)), kRounding), di,
                 row.high[axis].data() + x);
-      hn::Store(brick(hn::Mul(center, near), 0.0F), di, row.brick[axis].data() + x);
+      hn::Store(cell(hn::Mul(center, near), 0.0F), di, row.nearest[axis].data() + x);
     }
   }
 }
@@ -608,9 +702,10 @@ void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& imag
   pyramid = &image;
 }
 
-EightSeen see_blocks(const SightCameras& cameras, int level,
-                     const std::array<Vector3, 8>& center_W) noexcept {
-  return HWY_DYNAMIC_DISPATCH(see_blocks_lanes)(cameras, level, center_W);
+BlocksSeen see_blocks(const SightCameras& cameras, int level, std::span<const Vector3> center_W) noexcept {
+  BlocksSeen seen;
+  HWY_DYNAMIC_DISPATCH(see_blocks_lanes)(cameras, level, center_W, seen);
+  return seen;
 }
 
 EightSeen see_children(const SightCameras& cameras, const SightBlock& parent) noexcept {
@@ -626,7 +721,7 @@ void end_cells(const PixelLine& line, std::span<const float> depth_m, float rang
   HWY_DYNAMIC_DISPATCH(end_cells_lanes)(line, depth_m, range_m, row);
 }
 
-bool tile_steps(const DepthStrip& strip, int shift, DepthPyramid::Entry* entry) noexcept {
+StripSeen tile_steps(const DepthStrip& strip, int shift, DepthPyramid::Entry* entry) noexcept {
   return HWY_DYNAMIC_DISPATCH(tile_steps_lanes)(strip, shift, entry);
 }
 
@@ -634,9 +729,8 @@ PixelCounts pixel_counts(std::span<const float> depth_m, float range_m) noexcept
   return HWY_DYNAMIC_DISPATCH(pixel_counts_lanes)(depth_m, range_m);
 }
 
-void tile_boxes(const TileLine& line, const DepthPyramid::Entry* entry, std::size_t count,
-                TileRow& row) noexcept {
-  HWY_DYNAMIC_DISPATCH(tile_boxes_lanes)(line, entry, count, row);
+void tile_boxes(const TileLine& line, const TileEntries& tiles, TileRow& row) noexcept {
+  HWY_DYNAMIC_DISPATCH(tile_boxes_lanes)(line, tiles, row);
 }
 
 void least_of_four(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride,

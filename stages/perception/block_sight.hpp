@@ -51,6 +51,13 @@ struct EightSeen {
   std::array<std::uint8_t, 8> cameras{};  ///< For each block, the set of cameras that can see some of it.
 };
 
+/// The same of many blocks.
+struct BlocksSeen {
+  static constexpr std::size_t kMost = 64;
+  std::uint64_t free{}, mixed{};
+  std::array<std::uint8_t, kMost> cameras{};
+};
+
 /// A block and the cameras that can see some of it.
 struct SightBlock {
   Vector3 center_W = Vector3::Zero();
@@ -73,9 +80,9 @@ struct BrickSeen {
   std::uint32_t free_cells{0};  ///< Of level 0, in all groups.
 };
 
-/// Blocks of any position. RT-safe: O(cameras).
-[[nodiscard]] EightSeen see_blocks(const SightCameras& cameras, int level,
-                                   const std::array<Vector3, 8>& center_W) noexcept;
+/// At most kMost blocks of any position; each camera looks only at those in its view. RT-safe: O(cameras).
+[[nodiscard]] BlocksSeen see_blocks(const SightCameras& cameras, int level,
+                                    std::span<const Vector3> center_W) noexcept;
 /// The eight children of a block, in Morton order. RT-safe: O(cameras).
 [[nodiscard]] EightSeen see_children(const SightCameras& cameras, const SightBlock& parent) noexcept;
 /// Divides a brick (level 4) down to blocks of level `finest` (0 .. 3). RT-safe: at most kMaxGroups times
@@ -108,9 +115,13 @@ struct DepthStrip {
   std::size_t width{}, rows{};  ///< Pixels; at most kMaxTile rows.
   float range_m{}, steps_per_m{};
 };
+/// Whether all pixels of a strip have information, and whether one of them shows a surface.
+struct StripSeen {
+  bool complete{}, surface{};
+};
 /// Bounds of tiles of 2^shift columns and all rows of the strip, in steps of DepthPyramid. A pixel without
-/// information has no part in them: then false.
-[[nodiscard]] bool tile_steps(const DepthStrip& strip, int shift, DepthPyramid::Entry* entry) noexcept;
+/// information has no part in them.
+[[nodiscard]] StripSeen tile_steps(const DepthStrip& strip, int shift, DepthPyramid::Entry* entry) noexcept;
 
 /// Of an image: pixels with information, and those of them that show a surface.
 struct PixelCounts {
@@ -118,25 +129,29 @@ struct PixelCounts {
 };
 [[nodiscard]] PixelCounts pixel_counts(std::span<const float> depth_m, float range_m) noexcept;
 
-/// A row of tiles in space, in bricks: as PixelLine, for the tiles' middles. `half`: how much a direction
-/// differs at most within a tile.
+/// A row of tiles in space, in cells of any size: as PixelLine, for the tiles' middles. `half`: how much a
+/// direction differs at most within a tile.
 struct TileLine {
   std::array<std::int32_t, 3> origin{};
   std::array<float, 3> rest{}, first{}, step{}, half{};
   float steps_per_m{};
 };
-/// For each tile: whether it shows a surface; then in which bricks, at most, and in which one for the
-/// nearest.
+/// For each tile: whether it shows a surface; then in which cells, at most, and in which one its middle would
+/// be the nearest.
 struct TileRow {
   static constexpr std::size_t kMost = DepthPyramid::kMaxPixels + 8;
-  using Bricks = std::array<std::array<std::int32_t, kMost>, 3>;
-  alignas(32) Bricks low{};
-  alignas(32) Bricks high{};
-  alignas(32) Bricks brick{};
+  using Cells = std::array<std::array<std::int32_t, kMost>, 3>;
+  alignas(32) Cells low{};
+  alignas(32) Cells high{};
+  alignas(32) Cells nearest{};
   std::array<bool, kMost> surface{};
 };
-void tile_boxes(const TileLine& line, const DepthPyramid::Entry* entry, std::size_t count,
-                TileRow& row) noexcept;
+/// Bounds of a row of tiles, `stride` entries apart.
+struct TileEntries {
+  const DepthPyramid::Entry* entry{};
+  std::size_t stride{}, count{};
+};
+void tile_boxes(const TileLine& line, const TileEntries& tiles, TileRow& row) noexcept;
 
 /// to[x] = the least of fine[stride x + {0, next}] of two rows; `count` times.
 void least_of_four(const DepthPyramid::Entry* above, const DepthPyramid::Entry* below, std::size_t stride,

@@ -53,6 +53,7 @@ struct Brick {
   bool stale{};                                      ///< Cells changed since refresh().
   std::uint16_t known_count{};                       ///< Cells that are not unknown.
   std::int32_t x{}, y{}, z{};                        ///< Position in bricks from the map's corner.
+  std::int32_t cleared{};                            ///< BrickMap's mark of the last scan that saw past it.
 
   /// All cells become `value`: kUnknown or kFree.
   void fill(unsigned value) noexcept;

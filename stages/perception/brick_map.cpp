@@ -88,16 +88,10 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
 }
 
 const Brick* BrickMap::brick_at(std::size_t position) const noexcept {
-  switch (const std::int32_t slot = slot_[position]) {
-    case kUnknownBrick:
-      return nullptr;
-    case kFreeBrick:
-      return &free_brick_;
-    case kSurfaceBrick:
-      return &surface_brick_;
-    default:
-      return &brick_[static_cast<std::size_t>(slot)];
-  }
+  const std::int32_t slot = slot_[position];
+  if (slot >= 0) return &brick_[static_cast<std::size_t>(slot)];
+  if (slot <= kFreeBrick) return &free_brick_;
+  return slot == kSurfaceBrick ? &surface_brick_ : nullptr;
 }
 
 Vector3 BrickMap::brick_center_W(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
@@ -115,7 +109,7 @@ bool BrickMap::cell_of(const Vector3& p_W, Cell& cell) const noexcept {
 Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept {
   std::int32_t& slot = slot_[slot_of(bx, by, bz)];
   if (slot < 0) {
-    const bool was_free = slot == kFreeBrick;
+    const bool was_free = slot <= kFreeBrick;
     if (brick_pool_->exhausted() || (free_count_ == 0 && !give_up_farthest())) {
       // What cannot be kept any more is unknown: never free by want of memory.
       if (was_free) known_cells_ -= kCellsPerBrick;
@@ -131,6 +125,7 @@ Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexce
     fresh.y = by;
     fresh.z = bz;
     fresh.dirty = false;
+    fresh.cleared = 0;
     known_count_[static_cast<std::size_t>(slot)] = fresh.known_count;
   }
   Brick& brick = brick_[static_cast<std::size_t>(slot)];
@@ -143,13 +138,13 @@ Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexce
 
 void BrickMap::free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept {
   std::int32_t& slot = slot_[slot_of(bx, by, bz)];
-  if (slot == kFreeBrick) return;
   if (slot < 0) {
-    slot = kFreeBrick;
-    known_cells_ += kCellsPerBrick;
-    return;
+    if (slot > kFreeBrick) known_cells_ += kCellsPerBrick;
+    slot = free_now_;
+  } else if (Brick* brick = touch(bx, by, bz)) {
+    brick->add_free(kBrickLevel, 0, 1U);
+    brick->cleared = free_now_;
   }
-  if (Brick* brick = touch(bx, by, bz)) brick->add_free(kBrickLevel, 0, 1U);
 }
 
 bool BrickMap::give_up_farthest() noexcept {

@@ -4,10 +4,10 @@
 /// Free space is found projectively, coarse to fine: a block all of whose pixels see past it is free at once,
 /// a block behind the surface is left alone, the rest is divided until cells of p0. Surfaces are the pixels'
 /// end points, written at the finest level whatever p0 is: what a coarse block around them hides stays
-/// unknown, hence not free, until a finer look clears it. Only where p0 is a brick (4.8 m) or more, and in
-/// bricks of which nothing is known, it is enough to note that there is a surface: unknown is not free
-/// either. Free evidence is written first, surfaces after it, so that a look past a cell never erases a
-/// surface seen in the same scan.
+/// unknown, hence not free, until a finer look clears it. Only where p0 is a brick (4.8 m) or more, and where
+/// nothing is known, it is enough to note that a brick of which nothing is known has a surface: unknown is
+/// not free either. Free evidence is written first, surfaces after it, so that a look past a cell never
+/// erases a surface seen in the same scan.
 #pragma once
 
 #include <array>
@@ -70,9 +70,11 @@ class BrickMap final : public OccupancyMap, private MapView {
     std::int32_t x, y, z;
   };
   static constexpr std::int32_t kUnknownBrick = -1;
-  static constexpr std::int32_t kFreeBrick = -2;
   /// Nothing known but that a look at p0 >= 4.8 m met a surface there: occupied as a brick, unknown below.
-  static constexpr std::int32_t kSurfaceBrick = -3;
+  static constexpr std::int32_t kSurfaceBrick = -2;
+  /// This and what is less: free all over. How much less says in which scan it was last seen past as a whole.
+  static constexpr std::int32_t kFreeBrick = -3;
+  static constexpr std::uint64_t kFreeStamps = 1U << 30U;
   struct Node {
     int level;
     std::uint32_t x, y, z;  ///< In cells of `level` from the brick's corner.
@@ -99,7 +101,9 @@ class BrickMap final : public OccupancyMap, private MapView {
   };
   [[nodiscard]] std::size_t order_units(const IntegrationRequest& request) noexcept;
   [[nodiscard]] std::size_t unit_index(const Position& unit) const noexcept;
-  [[nodiscard]] Position unit_at(std::uint32_t index) const noexcept;
+  /// A position as one number, and back: no division.
+  [[nodiscard]] std::uint32_t packed(const Position& unit) const noexcept;
+  [[nodiscard]] Position unit_at(std::uint32_t packed) const noexcept;
   [[nodiscard]] Vector3 unit_center_W(const Position& unit) const noexcept;
   /// What of a cube lies within the bounds: no more than that is charged to v0.
   [[nodiscard]] double volume_m3(const Vector3& center_W, double edge_m) const noexcept;
@@ -128,11 +132,13 @@ class BrickMap final : public OccupancyMap, private MapView {
   /// The pixels [u0, u1) of row v.
   void add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
                   core::Work& work) noexcept;
-  /// Tile by tile: pixels are looked at where they may end in a brick of which something is known.
+  /// Tile by tile: pixels are looked at where they may end in space of which something was known before.
   void add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, core::Work& work) noexcept;
-  /// True if nothing is known of all bricks in which this tile of tiles_ may end: then that is all to be
-  /// done.
+  /// True if nothing is known of all space in which this tile of tiles_ may end: then that is all to be done.
   [[nodiscard]] bool note_surface(std::size_t tile) noexcept;
+  /// Whether something is known of what a brick and the cells [low, high] of a tile share. Not if this scan
+  /// saw past the whole brick: no pixel ends there.
+  [[nodiscard]] bool knows(const Brick& brick, const Cell& low, const Cell& high) const noexcept;
   [[nodiscard]] Brick* surface_brick(std::int32_t bx, std::int32_t by, std::int32_t bz, bool coarse) noexcept;
   /// Whether v0 reached this brick in this scan.
   [[nodiscard]] bool paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
@@ -162,7 +168,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   Vector3 corner_W_;              ///< Of the map, a multiple of the coarsest cell.
   std::int32_t nx_, ny_, nz_;     ///< Bricks, even numbers.
   Cell low_, high_;               ///< Cells of the bounds.
-  std::span<std::int32_t> slot_;  ///< Brick of each position, or kUnknownBrick, or kFreeBrick.
+  std::span<std::int32_t> slot_;  ///< Brick of each position, or what is known without one.
   std::span<Brick> brick_;
   core::PoolRecord* brick_pool_{nullptr};
   std::span<std::uint32_t> free_list_;
@@ -179,11 +185,12 @@ class BrickMap final : public OccupancyMap, private MapView {
   SurfaceRow row_{};
   TileRow tiles_{};
   double reach_m_{0.0};    ///< From the trajectory: v0 was spent up to here.
-  Brick free_brick_{};     ///< What every position with kFreeBrick reads as.
+  Brick free_brick_{};     ///< What every free position reads as.
   Brick surface_brick_{};  ///< The same for kSurfaceBrick.
   std::array<std::size_t, kMaxCameras> frame_of_{};
   std::array<std::optional<DepthPyramid>, kMaxCameras> pyramid_{};
   std::uint64_t known_cells_{0};
+  std::int32_t free_now_{kFreeBrick};  ///< A slot that is free and was seen past as a whole in this scan.
   Vector3 vehicle_W_ = Vector3::Zero();
   int view_level_{0};
   double view_radius_m_{0.0};  ///< Bricks whose centre is farther from view_center_W_ are unknown.

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -9,6 +10,9 @@ namespace {
 
 constexpr double kOrderStep_m = 0.5;  // blocks whose distances differ by less keep their order in space
 constexpr int kBlockLevel = kBrickLevel + 1;
+constexpr int kTileLevel = 2;  // where a tile may end is known in cells of this size
+constexpr double kTileCell_m = cell_size_m(kTileLevel);
+constexpr std::int32_t kTileCells = 1 << (kBrickLevel - kTileLevel);  // of a brick's edge
 
 std::uint32_t in_brick(std::int32_t cell) noexcept {
   return static_cast<std::uint32_t>(cell & (kBrickCells - 1));
@@ -30,13 +34,16 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
   guard_.begin(request.frames);
   for (std::size_t i = 0; i < request.frames.size(); ++i) {
     const PosedDepthFrame& posed = request.frames[i];
-    if (cameras_.count == config_.max_frames || guard_.check(posed) != Status::kOk ||
-        is_white(posed, request.moved_W) ||
-        pyramid_[cameras_.count]->build(posed.frame, tile_shift(posed.frame, request.level)) != Status::kOk) {
+    DepthPyramid* const image = cameras_.count < config_.max_frames ? &*pyramid_[cameras_.count] : nullptr;
+    // All pixels are read once, by the pyramid: it counts what the guard has to know.
+    if (image == nullptr || check_shape(posed) != Status::kOk ||
+        image->build(posed.frame, tile_shift(posed.frame, request.level)) != Status::kOk ||
+        guard_.check(posed, image->informed_count()) != Status::kOk ||
+        (!image->shows_surface() && is_white(posed, request.moved_W))) {
       ++result.frames_refused;
       continue;
     }
-    cameras_.camera[cameras_.count].prepare(posed, *pyramid_[cameras_.count],
+    cameras_.camera[cameras_.count].prepare(posed, *image,
                                             {config_.depth_margin_m, config_.depth_margin_per_m});
     frame_of_[cameras_.count++] = i;
   }
@@ -53,12 +60,21 @@ std::size_t BrickMap::unit_index(const Position& unit) const noexcept {
          static_cast<std::size_t>(unit.x);
 }
 
-BrickMap::Position BrickMap::unit_at(std::uint32_t index) const noexcept {
-  const int shift = unit_level_ - kBrickLevel;
-  const auto nx = static_cast<std::uint32_t>(nx_ >> shift);
-  const auto ny = static_cast<std::uint32_t>(ny_ >> shift);
-  return {static_cast<std::int32_t>(index % nx), static_cast<std::int32_t>((index / nx) % ny),
-          static_cast<std::int32_t>(index / nx / ny)};
+BrickMap::Position BrickMap::unit_at(std::uint32_t packed) const noexcept {
+  const auto x_bits = static_cast<unsigned>(std::bit_width(static_cast<std::uint32_t>(nx_)));
+  const auto y_bits = static_cast<unsigned>(std::bit_width(static_cast<std::uint32_t>(ny_)));
+  const auto low = [](std::uint32_t bits, unsigned count) {
+    return static_cast<std::int32_t>(bits & ((1U << count) - 1U));
+  };
+  return {low(packed, x_bits), low(packed >> x_bits, y_bits),
+          static_cast<std::int32_t>(packed >> (x_bits + y_bits))};
+}
+
+std::uint32_t BrickMap::packed(const Position& unit) const noexcept {
+  const auto x_bits = static_cast<unsigned>(std::bit_width(static_cast<std::uint32_t>(nx_)));
+  const auto y_bits = static_cast<unsigned>(std::bit_width(static_cast<std::uint32_t>(ny_)));
+  return static_cast<std::uint32_t>(unit.x) | static_cast<std::uint32_t>(unit.y) << x_bits |
+         static_cast<std::uint32_t>(unit.z) << (x_bits + y_bits);
 }
 
 Vector3 BrickMap::unit_center_W(const Position& unit) const noexcept {
@@ -171,10 +187,7 @@ std::size_t BrickMap::order_units(const IntegrationRequest& request) noexcept {
     s = total;
     total += count;
   }
-  for_each_unit([&](const Position& unit) {
-    const std::size_t at = unit_index(unit);
-    order_[start[order_key_[at]]++] = static_cast<std::uint32_t>(at);
-  });
+  for_each_unit([&](const Position& unit) { order_[start[order_key_[unit_index(unit)]]++] = packed(unit); });
   return total;
 }
 
@@ -183,7 +196,7 @@ void BrickMap::clear_brick(const Position& at, std::uint8_t cameras, int finest,
   see_brick(cameras_, {center_W, kBrickLevel, cameras}, finest, seen_);
   work.units += seen_.visited;
   work.volume_m3 += seen_.free_cells * volume_m3(center_W, kBrick_m) / kCellsPerBrick;
-  if (seen_.count == 0 || slot_[slot_of(at.x, at.y, at.z)] == kFreeBrick) return;
+  if (seen_.count == 0 || slot_[slot_of(at.x, at.y, at.z)] <= kFreeBrick) return;
   Brick* const brick = touch(at.x, at.y, at.z);
   if (brick == nullptr) return;  // pool full, and nothing farther away to give up
   for (std::size_t i = 0; i < seen_.count; ++i)
@@ -219,20 +232,19 @@ bool BrickMap::clear_unit(const Position& unit, std::uint8_t cameras, int finest
 std::size_t BrickMap::clear_units(std::size_t count, const IntegrationRequest& request,
                                   core::StageBudget& budget, core::Work& work) noexcept {
   const int finest = std::max(request.level, 0);
-  std::array<Vector3, 8> center_W;
-  for (std::size_t first = 0; first < count; first += 8) {
-    const std::size_t here = std::min<std::size_t>(8, count - first);
-    for (std::size_t i = 0; i < 8; ++i)
-      center_W[i] = unit_center_W(unit_at(order_[first + std::min(i, here - 1)]));
-    const EightSeen eight = see_blocks(cameras_, unit_level_, center_W);
-    ++work.units;
+  std::array<Vector3, BlocksSeen::kMost> center_W;
+  for (std::size_t first = 0; first < count; first += BlocksSeen::kMost) {
+    const std::size_t here = std::min(BlocksSeen::kMost, count - first);
+    for (std::size_t i = 0; i < here; ++i) center_W[i] = unit_center_W(unit_at(order_[first + i]));
+    const BlocksSeen seen = see_blocks(cameras_, unit_level_, std::span(center_W).first(here));
+    work.units += (here + 7) / 8;
     for (std::size_t i = 0; i < here; ++i) {
       const Position unit = unit_at(order_[first + i]);
-      if (((eight.free >> i) & 1U) != 0) {
+      if (((seen.free >> i) & 1U) != 0) {
         free_unit(unit);
         work.volume_m3 += volume_m3(center_W[i], cell_size_m(unit_level_));
-      } else if (((eight.mixed >> i) & 1U) != 0 && finest < unit_level_) {
-        if (!clear_unit(unit, eight.cameras[i], finest, budget, work))
+      } else if (((seen.mixed >> i) & 1U) != 0 && finest < unit_level_) {
+        if (!clear_unit(unit, seen.cameras[i], finest, budget, work))
           return first + i + 1;  // what was cleared in it needs its surfaces
       }
       if (work.volume_m3 >= request.volume_m3) return first + i + 1;
@@ -290,54 +302,75 @@ void BrickMap::add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_
 
 Brick* BrickMap::surface_brick(std::int32_t bx, std::int32_t by, std::int32_t bz, bool coarse) noexcept {
   std::int32_t& slot = slot_[slot_of(bx, by, bz)];
-  if (!coarse || slot >= 0 || slot == kFreeBrick) return touch(bx, by, bz);
+  if (!coarse || slot >= 0 || slot <= kFreeBrick) return touch(bx, by, bz);
   slot = kSurfaceBrick;
   return nullptr;
 }
 
+bool BrickMap::knows(const Brick& brick, const Cell& low, const Cell& high) const noexcept {
+  if (brick.cleared == free_now_) return false;
+  const auto first = [](std::int32_t from, std::int32_t at) {
+    return static_cast<std::uint32_t>(std::max(from - at * kTileCells, 0));
+  };
+  const auto last = [](std::int32_t to, std::int32_t at) {
+    return static_cast<std::uint32_t>(std::min(to - at * kTileCells, kTileCells - 1));
+  };
+  for (std::uint32_t z = first(low.z, brick.z); z <= last(high.z, brick.z); ++z)
+    for (std::uint32_t y = first(low.y, brick.y); y <= last(high.y, brick.y); ++y)
+      for (std::uint32_t x = first(low.x, brick.x); x <= last(high.x, brick.x); ++x)
+        if (brick.flags(kTileLevel, morton3(x, y, z)) != content::kUnknown) return true;
+  return false;
+}
+
 bool BrickMap::note_surface(std::size_t tile) noexcept {
   if (!tiles_.surface[tile]) return true;
-  const auto low = [&](std::size_t axis) { return std::max(tiles_.low[axis][tile], 0); };
-  const auto high = [&](std::size_t axis, std::int32_t n) {
-    return std::min(tiles_.high[axis][tile], n - 1);
-  };
-  for (std::int32_t bz = low(2); bz <= high(2, nz_); ++bz) {
-    for (std::int32_t by = low(1); by <= high(1, ny_); ++by) {
-      for (std::int32_t bx = low(0); bx <= high(0, nx_); ++bx) {
-        const std::int32_t slot = slot_[slot_of(bx, by, bz)];
-        if (slot != kUnknownBrick && slot != kSurfaceBrick) return false;
+  constexpr int kShift = kBrickLevel - kTileLevel;
+  const Cell low{tiles_.low[0][tile], tiles_.low[1][tile], tiles_.low[2][tile]};
+  const Cell high{tiles_.high[0][tile], tiles_.high[1][tile], tiles_.high[2][tile]};
+  const std::int32_t x0 = std::max(low.x >> kShift, 0), x1 = std::min(high.x >> kShift, nx_ - 1);
+  for (std::int32_t bz = std::max(low.z >> kShift, 0); bz <= std::min(high.z >> kShift, nz_ - 1); ++bz) {
+    for (std::int32_t by = std::max(low.y >> kShift, 0); by <= std::min(high.y >> kShift, ny_ - 1); ++by) {
+      const std::int32_t* const row = slot_.data() + slot_of(0, by, bz);
+      for (std::int32_t bx = x0; bx <= x1; ++bx) {
+        const std::int32_t slot = row[bx];
+        if (slot == kUnknownBrick || slot == kSurfaceBrick || slot == free_now_) continue;
+        if (slot < 0 || knows(brick_[static_cast<std::size_t>(slot)], low, high)) return false;
       }
     }
   }
-  const Position at{tiles_.brick[0][tile], tiles_.brick[1][tile], tiles_.brick[2][tile]};
+  const Cell at{tiles_.nearest[0][tile] >> kShift, tiles_.nearest[1][tile] >> kShift,
+                tiles_.nearest[2][tile] >> kShift};
   const bool inside = at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x < nx_ && at.y < ny_ && at.z < nz_;
-  if (inside && paid(at.x, at.y, at.z)) slot_[slot_of(at.x, at.y, at.z)] = kSurfaceBrick;
+  if (!inside || !paid(at.x, at.y, at.z)) return true;
+  std::int32_t& slot = slot_[slot_of(at.x, at.y, at.z)];
+  if (slot == kUnknownBrick) slot = kSurfaceBrick;
   return true;
 }
 
 void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, core::Work& work) noexcept {
   const firmware_if::DepthFrame& frame = camera.posed->frame;
   const Matrix3& R = camera.posed->X_WC.R_RT;
-  const DepthPyramid::Level& tiles = image.tiles();
-  const std::size_t side = std::size_t{1} << static_cast<unsigned>(tiles.shift);
-  const auto columns = static_cast<std::size_t>(tiles.width);
+  // Two tiles of the pyramid a side: every second entry of the level above them.
+  const DepthPyramid::Level& pairs = image.level(image.tiles().shift + 1);
+  const std::size_t side = std::size_t{2} << static_cast<unsigned>(pairs.shift);
+  const std::size_t columns = (static_cast<std::size_t>(pairs.width) + 1) / 2;
   const double tile_pitch = camera.pitch * static_cast<double>(side);
-  const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kBrick_m;
+  const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kTileCell_m;
   TileLine line;
   line.steps_per_m = image.steps_per_m();
   for (int axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<std::size_t>(axis);
     line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
     line.rest[k] = static_cast<float>(origin[axis] - line.origin[k]);
-    line.step[k] = static_cast<float>(-tile_pitch * R(axis, 1) / kBrick_m);
+    line.step[k] = static_cast<float>(-tile_pitch * R(axis, 1) / kTileCell_m);
     line.half[k] =
-        static_cast<float>(0.5 * tile_pitch * (std::fabs(R(axis, 1)) + std::fabs(R(axis, 2))) / kBrick_m);
+        static_cast<float>(0.5 * tile_pitch * (std::fabs(R(axis, 1)) + std::fabs(R(axis, 2))) / kTileCell_m);
   }
-  const DepthPyramid::Entry* entry = tiles.entry;
-  for (std::size_t v = 0; v < frame.height; v += side, entry += columns) {
+  const DepthPyramid::Entry* entry = pairs.entry;
+  for (std::size_t v = 0; v < frame.height; v += side, entry += 2 * static_cast<std::size_t>(pairs.width)) {
     const double half = 0.5 * static_cast<double>(side);
-    line.first = direction(camera, half, static_cast<double>(v) + half, kBrick_m);
-    tile_boxes(line, entry, columns, tiles_);
+    line.first = direction(camera, half, static_cast<double>(v) + half, kTileCell_m);
+    tile_boxes(line, {entry, 2, columns}, tiles_);
     work.units += columns;
     for (std::size_t x = 0; x < columns; ++x) {
       if (note_surface(x)) continue;
@@ -385,7 +418,7 @@ void BrickMap::free_vehicle() noexcept {
         Cell cell{};
         if (offset.norm() > r_m || !cell_of(vehicle_W_ + offset, cell)) continue;
         const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
-        if (slot_[slot_of(bx, by, bz)] == kFreeBrick) continue;
+        if (slot_[slot_of(bx, by, bz)] <= kFreeBrick) continue;
         Brick* brick = touch(bx, by, bz);
         if (brick == nullptr) continue;
         const std::uint32_t morton = morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z));
@@ -401,12 +434,15 @@ Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget&
   result.work.level = std::clamp(request.level, 0, kPrecisionLevels - 1);
   if (usable_frames(request, result) == 0 || request.trajectory_W.empty()) return Status::kInvalidArgument;
   ++counters_.scans;
+  free_now_ = kFreeBrick - 1 - static_cast<std::int32_t>(counters_.scans % kFreeStamps);
   vehicle_W_ = cameras_.camera[0].p_WC;
   const std::size_t count = order_units(request);
   const std::size_t done = clear_units(count, request, budget, result.work);
-  reach_m_ =
-      done < count && done > 0 ? order_key_[order_[done - 1]] * kOrderStep_m : (done < count ? 0.0 : 1e18);
+  reach_m_ = done < count ? 0.0 : 1e18;
+  if (done < count && done > 0) reach_m_ = order_key_[unit_index(unit_at(order_[done - 1]))] * kOrderStep_m;
   free_vehicle();
+  if (request.level >= kBrickLevel)
+    for (std::size_t i = 0; i < dirty_count_; ++i) refresh(brick_[dirty_[i]]);  // add_tiles() reads mips
   add_surfaces(request, result.work);
   refresh_dirty();
   return done < count ? Status::kBudgetSpent : Status::kOk;

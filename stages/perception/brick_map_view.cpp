@@ -26,7 +26,7 @@ Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& bu
         // known is as true as ever, v1 only saves the planner work.
         if (position % 1024 == 1023 && budget.spent(work)) return Status::kBudgetSpent;
         const std::int32_t slot = slot_[position];
-        const std::size_t count = slot == kFreeBrick ? kCellsPerBrick
+        const std::size_t count = slot <= kFreeBrick ? kCellsPerBrick
                                   : slot >= 0        ? known_count_[static_cast<std::size_t>(slot)]
                                                      : 0;
         if (count == 0) continue;

@@ -60,14 +60,25 @@ DepthPyramid::DepthPyramid(core::Arena& arena, std::size_t max_side) noexcept : 
 void DepthPyramid::fill_tiles(const firmware_if::DepthFrame& frame, unsigned shift, Entry* tile) noexcept {
   const std::size_t side = std::size_t{1} << shift;
   const std::size_t columns = (frame.width + side - 1) >> shift;
+  informed_count_ = 0;
+  shows_surface_ = false;
   for (std::size_t y = 0; y < frame.height; y += side, tile += columns) {
     const std::size_t rows = std::min(side, frame.height - y);
     const DepthStrip strip{frame.depth_m.data() + y * frame.width, frame.width, rows, frame.range_m,
                            steps_per_m_};
-    if (tile_steps(strip, static_cast<int>(shift), tile)) continue;
+    // The rows of a strip are read side by side, which no cache foresees.
+    constexpr std::size_t kLine = 64 / sizeof(float);
+    const std::size_t next = (y + rows) * frame.width;
+    const std::size_t after = std::min(next + side * frame.width, frame.depth_m.size());
+    for (std::size_t i = next; i < after; i += kLine) __builtin_prefetch(&frame.depth_m[i]);
+    const StripSeen seen = tile_steps(strip, static_cast<int>(shift), tile);
+    shows_surface_ = shows_surface_ || seen.surface;
+    informed_count_ += rows * frame.width;
+    if (seen.complete) continue;
     for (std::size_t v = y; v < y + rows; ++v) {
       for (std::size_t u = 0; u < frame.width; ++u) {
         if (frame.depth_m[v * frame.width + u] > 0.0F) continue;
+        --informed_count_;
         Entry& entry = tile[u >> shift];
         entry = min_of(entry, entry_of(bridged_m(frame, u, v), frame.range_m, steps_per_m_));
       }

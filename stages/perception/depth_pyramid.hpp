@@ -69,6 +69,9 @@ class DepthPyramid {
   /// The tiles, side by side; pixels if tile_shift was 0.
   [[nodiscard]] const Level& tiles() const noexcept { return level_[0]; }
   [[nodiscard]] float steps_per_m() const noexcept { return steps_per_m_; }
+  /// Pixels that are neither NaN nor <= 0, and whether one of them shows a surface.
+  [[nodiscard]] std::size_t informed_count() const noexcept { return informed_count_; }
+  [[nodiscard]] bool shows_surface() const noexcept { return shows_surface_; }
   /// Pixels [u0, u1] x [v0, v1], inside the image. Conservative. O(1).
   [[nodiscard]] Bound bound(int u0, int v0, int u1, int v1) const noexcept;
 
@@ -77,6 +80,8 @@ class DepthPyramid {
 
   std::size_t max_side_;
   float steps_per_m_{0.0F};
+  std::size_t informed_count_{0};
+  bool shows_surface_{false};
   std::array<Level, kMaxLevels> level_{};
   std::span<Entry> memory_{};
 };

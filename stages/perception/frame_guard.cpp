@@ -31,20 +31,31 @@ double seconds_between(MonotonicTime from, MonotonicTime to) noexcept {
   return seconds(to.time_since_epoch()) - seconds(from.time_since_epoch());
 }
 
+bool is_informed(const PosedDepthFrame& posed, std::size_t informed_count) noexcept {
+  const auto pixels = static_cast<double>(posed.frame.depth_m.size());
+  return static_cast<double>(informed_count) >= (posed.is_cloud ? 1.0 : kLeastInformedRatio * pixels);
+}
+
+std::size_t informed_count(const firmware_if::DepthFrame& frame) noexcept {
+  return pixel_counts(frame.depth_m, frame.range_m).informed;
+}
+
 }  // namespace
 
-Status check_frame(const PosedDepthFrame& posed) noexcept {
+Status check_shape(const PosedDepthFrame& posed) noexcept {
   const firmware_if::DepthFrame& f = posed.frame;
   const bool size_ok = f.width >= 8 && f.height >= 8 && f.width <= DepthPyramid::kMaxPixels &&
                        f.height <= DepthPyramid::kMaxPixels &&
                        f.depth_m.size() == std::size_t{f.width} * std::size_t{f.height};
   const bool optics_ok = f.range_m > 0.0F && f.range_m <= kMaxRange_m && f.tan_half_fov_ratio > 0.0F &&
                          f.tan_half_fov_ratio <= kMaxTanHalfFov;
-  if (!size_ok || !optics_ok || !is_finite(posed.X_WC.p_RT) || !posed.X_WC.R_RT.allFinite())
-    return Status::kInvalidArgument;
-  const double least = posed.is_cloud ? 1.0 : kLeastInformedRatio * static_cast<double>(f.depth_m.size());
-  const auto informed = static_cast<double>(pixel_counts(f.depth_m, f.range_m).informed);
-  return informed >= least ? Status::kOk : Status::kInvalidArgument;
+  const bool pose_ok = is_finite(posed.X_WC.p_RT) && posed.X_WC.R_RT.allFinite();
+  return size_ok && optics_ok && pose_ok ? Status::kOk : Status::kInvalidArgument;
+}
+
+Status check_frame(const PosedDepthFrame& posed) noexcept {
+  if (check_shape(posed) != Status::kOk) return Status::kInvalidArgument;
+  return is_informed(posed, informed_count(posed.frame)) ? Status::kOk : Status::kInvalidArgument;
 }
 
 void FrameGuard::begin(std::span<const PosedDepthFrame> scan) noexcept {
@@ -75,9 +86,14 @@ bool FrameGuard::frozen(const firmware_if::DepthFrame& frame) noexcept {
 }
 
 Status FrameGuard::check(const PosedDepthFrame& posed) noexcept {
+  if (check_shape(posed) != Status::kOk) return Status::kInvalidArgument;
+  return check(posed, informed_count(posed.frame));
+}
+
+Status FrameGuard::check(const PosedDepthFrame& posed, std::size_t informed_count) noexcept {
   const double late_s = seconds_between(scan_, posed.frame.stamp);
   const bool in_time = !scan_too_old_ && std::fabs(late_s) <= seconds(kStampSpread);
-  if (!in_time || check_frame(posed) != Status::kOk || frozen(posed.frame)) return Status::kInvalidArgument;
+  if (!in_time || !is_informed(posed, informed_count) || frozen(posed.frame)) return Status::kInvalidArgument;
   return Status::kOk;
 }
 

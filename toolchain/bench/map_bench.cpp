@@ -17,6 +17,7 @@
 
 #include "core/precision.hpp"
 #include "stages/perception/brick_map.hpp"
+#include "stages/perception/point_cloud.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 #include "toolchain/bench/map_plot.hpp"
 #include "toolchain/bench/stock_octomap.hpp"
@@ -26,6 +27,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kMovingScans = 3;
+bool once = false;  // --once: one repetition, for callgrind
 constexpr std::array<StockMode, 4> kModes{StockMode::kPlain, StockMode::kLazy, StockMode::kDiscretised,
                                           StockMode::kBoth};
 
@@ -126,17 +128,37 @@ void measure(benchmark::State& state, const Case& c, ResetFunction&& reset, Inse
 
 void own(benchmark::State& state, const Case& c) {
   OwnMap& map = own_map(c.pixels, c.range_m);
-  for (int n = 0; n <= kMovingScans; ++n) (void)scan_of(n, c.pixels, c.range_m);
+  for (int n = 0; n <= (c.moving ? kMovingScans : 0); ++n) (void)scan_of(n, c.pixels, c.range_m);
   std::uint64_t units = 0;
   measure(state, c, [&] { map.reset(); }, [&](int n) { units = map.integrate(scan_of(n, c.pixels, c.range_m), c.level); });
   state.counters["units"] = static_cast<double>(units);
 }
 
-/// At coarse precision stock gets what its pipeline would give it: one mean point a cell, the averaging not counted.
-void stock(benchmark::State& state, const Case& c, StockMode mode) {
+/// The point cloud stage: what the averaging of stock's input would cost.
+void cloud(benchmark::State& state, const Case& c) {
+  std::vector<std::byte> block(stages::PointCloud::arena_bytes({}));
+  std::optional<core::Arena> arena;
+  std::unique_ptr<stages::PointCloud> points;
+  const Scan& scan = scan_of(0, c.pixels, c.range_m);
+  measure(
+      state, c,
+      [&] {
+        arena.emplace(block);
+        points = std::make_unique<stages::PointCloud>(stages::PointCloud::Config{}, *arena);
+      },
+      [&](int) {
+        core::UnlimitedBudget unlimited;
+        core::Work work;
+        if (points->step(scan.frames(), c.level, unlimited, work) != Status::kOk) std::abort();
+      });
+}
+
+/// At coarse precision stock gets what its pipeline would give it: one mean point a cell, the averaging not counted. Or,
+/// `all_pixels`, what the own map gets.
+void stock(benchmark::State& state, const Case& c, StockMode mode, bool all_pixels) {
   std::vector<StockScan> scans;
   for (int n = 0; n <= (c.moving ? kMovingScans : 0); ++n)
-    scans.push_back(stock_scan(scan_of(n, c.pixels, c.range_m), c.level == 0 ? 0.0 : cell_size_m(c.level)));
+    scans.push_back(stock_scan(scan_of(n, c.pixels, c.range_m), all_pixels ? 0.0 : cell_size_m(c.level)));
   std::unique_ptr<octomap::OcTree> tree;
   measure(
       state, c, [&] { tree = std::make_unique<octomap::OcTree>(cell_size_m(c.level)); },
@@ -147,13 +169,22 @@ void stock(benchmark::State& state, const Case& c, StockMode mode) {
 /// Returns how many were registered.
 std::size_t add(const Case& c, bool all_modes) {
   std::size_t registered = 1;
-  benchmark::RegisterBenchmark(name_of("own", c).c_str(), [c](benchmark::State& s) { own(s, c); })
-      ->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(1)->Repetitions(15)->ReportAggregatesOnly(false);
+  const auto measured = [](auto* registered_benchmark, int repetitions) {
+    registered_benchmark->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(1)->Repetitions(once ? 1 : repetitions);
+  };
+  measured(benchmark::RegisterBenchmark(name_of("own", c).c_str(), [c](benchmark::State& s) { own(s, c); }), 15);
+  if (all_modes && c.level > 0) {
+    measured(benchmark::RegisterBenchmark(name_of("cloud", c).c_str(), [c](benchmark::State& s) { cloud(s, c); }), 15);
+    measured(benchmark::RegisterBenchmark(name_of("stock_pixels", c).c_str(),
+                                          [c](benchmark::State& s) { stock(s, c, StockMode::kBoth, true); }),
+             5);
+    registered += 2;
+  }
   for (const StockMode mode : kModes) {
     if (!all_modes && mode != StockMode::kPlain && mode != StockMode::kBoth) continue;
-    benchmark::RegisterBenchmark(name_of(std::string("stock_") + to_string(mode), c).c_str(),
-                                 [c, mode](benchmark::State& s) { stock(s, c, mode); })
-        ->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(1)->Repetitions(c.level > 0 ? 5 : (c.moving ? 1 : 2));
+    measured(benchmark::RegisterBenchmark(name_of(std::string("stock_") + to_string(mode), c).c_str(),
+                                          [c, mode](benchmark::State& s) { stock(s, c, mode, c.level == 0); }),
+             c.level > 1 ? 15 : (c.level > 0 ? 5 : (c.moving ? 1 : 2)));
     ++registered;
   }
   return registered;
@@ -257,12 +288,19 @@ int main(int argc, char** argv) {
     argc -= 2;
     argv += 2;
   }
+  if (argc > 1 && std::string(argv[1]) == "--once") {
+    once = true;
+    argv[1] = argv[0];
+    --argc;
+    ++argv;
+  }
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   std::size_t registered = 0;
   for (const int range_m : {20, 40})
     for (int level = 0; level < roborun::kPrecisionLevels; ++level) registered += add({level, range_m, 128, false}, true);
-  for (const int range_m : {20, 40}) registered += add({0, range_m, 128, true}, false);
+  for (int level = 0; level < roborun::kPrecisionLevels; ++level) registered += add({level, 20, 128, true}, false);
+  registered += add({0, 40, 128, true}, false);
   for (const int pixels : {64, 256}) registered += add({0, 20, pixels, false}, false);
   BestReporter reporter;
   const std::size_t run = benchmark::RunSpecifiedBenchmarks(&reporter);
@@ -270,11 +308,15 @@ int main(int argc, char** argv) {
 
   const Agreement near = agreement(20), far = agreement(40);
   const double bytes_per_cell = std::fmax(own_map(128, 20).bytes_per_cell(), own_map(128, 40).bytes_per_cell());
-  double worst = kInfinity;
+  double worst = kInfinity, worst_from_images = kInfinity;
   for (const int range_m : {20, 40})
     for (int level = 0; level < roborun::kPrecisionLevels; ++level) {
       const Case c{level, range_m, 128, false};
-      worst = std::fmin(worst, reporter.best_stock_ms(c) / reporter.ms(name_of("own", c)));
+      const double own_ms = reporter.ms(name_of("own", c)), stock_ms = reporter.best_stock_ms(c);
+      worst = std::fmin(worst, stock_ms / own_ms);
+      const double from_images_ms =
+          level == 0 ? stock_ms : std::fmin(reporter.ms(name_of("cloud", c)) + stock_ms, reporter.ms(name_of("stock_pixels", c)));
+      worst_from_images = std::fmin(worst_from_images, from_images_ms / own_ms);
     }
   if (!picture.empty()) {
     std::vector<CostAtPrecision> precision;
@@ -300,10 +342,11 @@ int main(int argc, char** argv) {
   const auto best = [&](int range_m) { return reporter.best_stock_ms({0, range_m, 128, false}) / own_ms(0, range_m); };
   std::printf(
       "{\"speedup_plain_20m\":%.1f,\"speedup_plain_40m\":%.1f,\"speedup_best_20m\":%.1f,\"speedup_best_40m\":%.1f,"
-      "\"coarse_cost_ratio\":%.3f,\"worst_speedup_best_any_p0\":%.2f,\"allocations\":%.0f,\"bytes_per_cell\":%.2f,"
+      "\"coarse_cost_ratio\":%.3f,\"worst_speedup_best_any_p0\":%.2f,"
+      "\"worst_speedup_from_images_any_p0\":%.2f,\"allocations\":%.0f,\"bytes_per_cell\":%.2f,"
       "\"occupied_agreement\":%.5f,\"free_agreement\":%.5f,\"false_free_vs_stock\":%.4f}\n",
       plain(20), plain(40), best(20), best(40), std::fmax(own_ms(4, 20) / own_ms(0, 20), own_ms(4, 40) / own_ms(0, 40)),
-      worst, reporter.own_allocations(), bytes_per_cell, std::fmin(near.occupied_ratio, far.occupied_ratio),
+      worst, worst_from_images, reporter.own_allocations(), bytes_per_cell, std::fmin(near.occupied_ratio, far.occupied_ratio),
       std::fmin(near.free_ratio, far.free_ratio),
       static_cast<double>(near.own_false_free + far.own_false_free) /
           static_cast<double>(std::max<std::size_t>(near.stock_false_free + far.stock_false_free, 1)));

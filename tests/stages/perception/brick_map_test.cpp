@@ -195,6 +195,47 @@ TEST_F(BrickMapTest, ACoarseLookSeesWhatAppearsInFreeSpace) {
   }
 }
 
+TEST_F(BrickMapTest, WhereAPixelOfACoarseLookEndsNothingStaysFree) {
+  core::CounterRng rng(8);
+  int ended_in_free_space = 0;
+  for (int n = 0; n < 8; ++n) {
+    std::vector<std::byte> block(64U << 20U);
+    core::Arena arena(block);
+    BrickMap map(config_, arena);
+    test::Scene scene = scene_;
+    const std::array<Vector3, 2> here{at_, at_ + Vector3(0.7, -0.4, 0.3)};
+    (void)map.integrate({scene.look(here[0]), 0, kInfinity, std::span(here).first(1)}, unlimited_, result_);
+    for (int pole = 0; pole < 12; ++pole) {
+      const Vector3 low(rng.uniform(-12, 12), rng.uniform(-12, 12), rng.uniform(0.5, 6));
+      if ((low - at_).norm() > 2.5)
+        scene.solid.push_back({low, low + Vector3(0.17, 0.23, rng.uniform(0.2, 4))});
+    }
+    const auto frames = scene.look(here[1]);
+    core::Work work;
+    std::uint64_t lookups = 0;
+    (void)map.export_view({0, kInfinity, at_}, unlimited_, work);
+    std::vector<Vector3> free_ends;
+    for (const PosedDepthFrame& posed : frames) {
+      for (std::size_t i = 0; i < posed.frame.depth_m.size(); ++i) {
+        const auto depth_m = static_cast<double>(posed.frame.depth_m[i]);
+        if (!(depth_m < 20.0)) continue;
+        const double u = static_cast<double>(i % 64) + 0.5, v = static_cast<double>(i / 64) + 0.5;
+        const Vector3 p_W = posed.X_WC * (depth_m * Vector3(1.0, 1.0 - u / 32.0, 1.0 - v / 32.0));
+        const Vector3 in_cell = p_W / 0.3 - (p_W / 0.3).array().floor().matrix();
+        const bool clear_case = in_cell.minCoeff() > 0.01 && in_cell.maxCoeff() < 0.99;
+        if (clear_case && map.view().at(p_W, lookups) == CellState::kFree) free_ends.push_back(p_W);
+      }
+    }
+    ended_in_free_space += static_cast<int>(free_ends.size());
+    const int level = kBrickLevel + n % 2;
+    ASSERT_EQ(map.integrate({frames, level, kInfinity, here}, unlimited_, result_), Status::kOk);
+    (void)map.export_view({0, kInfinity, at_}, unlimited_, work);
+    for (const Vector3& p_W : free_ends)
+      EXPECT_EQ(map.view().at(p_W, lookups), CellState::kOccupied) << level << ": " << p_W.transpose();
+  }
+  EXPECT_GT(ended_in_free_space, 500);
+}
+
 TEST_F(BrickMapTest, ACoarseLookNotesSurfacesInUnknownBricksUntilAFinerOne) {
   const std::array<Vector3, 1> here{at_};
   const auto frames = scene_.look(at_);
