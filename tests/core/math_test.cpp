@@ -138,7 +138,7 @@ TEST(CounterRng, MultipliesWithoutAWideTypeAsWithOne) {
 TEST(CounterRng, StaysBelowItsBound) {
   CounterRng rng(9);
   std::array<int, 7> seen{};
-  for (int i = 0; i < 7000; ++i) ++seen[rng.below(7)];
+  for (int i = 0; i < 7000; ++i) ++seen[static_cast<std::size_t>(rng.below(7))];
   for (const int count : seen) EXPECT_NEAR(count, 1000, 200);
   EXPECT_EQ(rng.below(0), 0U);
 }
