@@ -16,6 +16,16 @@ namespace roborun::core {
   return x ^ (x >> 31U);
 }
 
+/// The upper half of the 128-bit product, from four products of 32 bits: not every machine has the type.
+/// RT-safe: O(1).
+[[nodiscard]] constexpr std::uint64_t multiply_high(std::uint64_t a, std::uint64_t b) noexcept {
+  constexpr std::uint64_t kLow = 0xFFFFFFFFULL;
+  // None of these sums can overflow: (2^32 - 1)^2 + 2 (2^32 - 1) = 2^64 - 1.
+  const std::uint64_t middle = (a >> 32U) * (b & kLow) + ((a & kLow) * (b & kLow) >> 32U);
+  const std::uint64_t other = (a & kLow) * (b >> 32U) + (middle & kLow);
+  return (a >> 32U) * (b >> 32U) + (middle >> 32U) + (other >> 32U);
+}
+
 /// SplitMix64 with a key of its own for each (seed, stream). Copying copies the position. RT-safe: O(1) a
 /// draw.
 class CounterRng {
@@ -28,10 +38,7 @@ class CounterRng {
   double uniform() noexcept { return static_cast<double>(next() >> 11U) * 0x1.0p-53; }
   double uniform(double low, double high) noexcept { return low + (high - low) * uniform(); }
   /// In [0, count); 0 for count 0. Bias below count / 2^64.
-  std::uint64_t below(std::uint64_t count) noexcept {
-    __extension__ using Wide = unsigned __int128;
-    return static_cast<std::uint64_t>((static_cast<Wide>(next()) * count) >> 64U);
-  }
+  std::uint64_t below(std::uint64_t count) noexcept { return multiply_high(next(), count); }
   /// Standard normal by Box and Muller; two draws each, so that the position never depends on earlier calls.
   double normal() noexcept {
     const double radius = std::sqrt(-2.0 * core::log(1.0 - uniform()));

@@ -1,12 +1,16 @@
 #include "platform/app/actuator_link.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace roborun::app {
 namespace {
 
 constexpr std::uint32_t kBitrate_bps = 1'000'000;
 constexpr std::uint8_t kFirstEscNode = 21;
+constexpr std::uint8_t kPowerModuleNode = 25;
+constexpr std::size_t kPowerModulePort = 5;
+constexpr Nanos kBatterySilence = 5 * sitl::FakePowerModule::kPeriod;
 
 firmware_if::CanBus& node_end(sitl::FakeCanPort& simulated, MotorBus* outside) noexcept {
   if (outside != nullptr) return outside->node();
@@ -15,6 +19,11 @@ firmware_if::CanBus& node_end(sitl::FakeCanPort& simulated, MotorBus* outside) n
 firmware_if::CanBus& esc_end(sitl::FakeCan& simulated, MotorBus* outside, std::size_t index) noexcept {
   if (outside != nullptr) return outside->esc(index);
   return simulated.port(1 + index);
+}
+/// It only sends: outside it does so through the last ESC's end.
+firmware_if::CanBus& power_module_end(sitl::FakeCan& simulated, MotorBus* outside) noexcept {
+  if (outside != nullptr) return outside->esc(3);
+  return simulated.port(kPowerModulePort);
 }
 
 }  // namespace
@@ -28,6 +37,7 @@ ActuatorLink::ActuatorLink(std::uint64_t seed, Nanos minor_frame, MotorBus* outs
              {{.node_id = kFirstEscNode + 1, .index = 1}, esc_end(bus_, outside, 1)},
              {{.node_id = kFirstEscNode + 2, .index = 2}, esc_end(bus_, outside, 2)},
              {{.node_id = kFirstEscNode + 3, .index = 3}, esc_end(bus_, outside, 3)}}},
+      power_module_(kPowerModuleNode, power_module_end(bus_, outside)),
       kill_switch_(kill_open_, kill_closed_) {
   kill_closed_.drive(true, {});
 }
@@ -55,6 +65,14 @@ Nanos ActuatorLink::esc_silence(MonotonicTime now) const noexcept {
   return longest;
 }
 
+double ActuatorLink::charge_ratio(MonotonicTime now) const noexcept {
+  const auto& battery = node_.inbox().battery;
+  const std::uint8_t charge_pct = battery.message.state_of_charge_pct;
+  if (battery.count == 0 || now - battery.stamp > kBatterySilence || charge_pct > 100)
+    return std::numeric_limits<double>::quiet_NaN();
+  return charge_pct / 100.0;
+}
+
 void ActuatorLink::break_lines(MonotonicTime now) noexcept {
   using sitl::FaultKind;
   const FaultKind kill = faults_->of(sitl::Component::kKillSwitch);
@@ -70,6 +88,16 @@ void ActuatorLink::break_lines(MonotonicTime now) noexcept {
   }
   bus_.set_faults({.loss_ratio = can == FaultKind::kIntermittent ? 0.5 : 0.0,
                    .corrupt_ratio = can == FaultKind::kGarbage ? 0.5 : 0.0});
+}
+
+double ActuatorLink::break_battery(double charge_ratio) noexcept {
+  using sitl::FaultKind;
+  const FaultKind kind = faults_->of(sitl::Component::kBattery);
+  power_module_.set_silent(kind == FaultKind::kOff);
+  if (kind == FaultKind::kNone) sound_charge_ratio_ = charge_ratio;
+  if (kind == FaultKind::kWrong) return 0.05;
+  if (kind == FaultKind::kGarbage) return std::numeric_limits<double>::quiet_NaN();
+  return sound_charge_ratio_;
 }
 
 double ActuatorLink::break_esc(std::size_t i, double ratio, MonotonicTime now) noexcept {
@@ -107,8 +135,9 @@ void ActuatorLink::step(MonotonicTime now) noexcept {
   commanded_ = false;
 }
 
-void ActuatorLink::advance(MonotonicTime now, firmware_if::Motors& motors) noexcept {
+void ActuatorLink::advance(MonotonicTime now, double charge_ratio, firmware_if::Motors& motors) noexcept {
   bus_.advance(now);
+  power_module_.step(faults_ != nullptr ? break_battery(charge_ratio) : charge_ratio, now);
   firmware_if::MotorCommand out;
   for (std::size_t i = 0; i < escs_.size(); ++i) {
     out.thrust_ratio[i] = escs_[i].step(now);

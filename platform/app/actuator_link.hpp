@@ -1,4 +1,5 @@
-/// From motor commands to turning motors, in simulation as on the vehicle: switch, gate, frames, bus, ESCs.
+/// From motor commands to turning motors, in simulation as on the vehicle: switch, gate, frames, bus, ESCs;
+/// and from the battery back to the runtime, over the same bus.
 #pragma once
 
 #include <array>
@@ -11,6 +12,7 @@
 #include "platform/sitl/bus/fake_can.hpp"
 #include "platform/sitl/bus/fake_esc.hpp"
 #include "platform/sitl/bus/fake_gpio.hpp"
+#include "platform/sitl/bus/fake_power_module.hpp"
 #include "platform/sitl/fault/fault_line.hpp"
 
 namespace roborun::app {
@@ -29,10 +31,10 @@ class ActuatorLink final : public firmware_if::Motors {
   [[nodiscard]] Status command(const firmware_if::MotorCommand& command) noexcept override;
   /// The end of a minor frame: samples the kill switch, hears and sends.
   void step(MonotonicTime now) noexcept;
-  /// Runs the bus until `now`; the ESCs hand their throttle to `motors`.
-  void advance(MonotonicTime now, firmware_if::Motors& motors) noexcept;
+  /// Runs the bus until `now`; the ESCs hand their throttle to `motors`, the power module says what is left.
+  void advance(MonotonicTime now, double charge_ratio, firmware_if::Motors& motors) noexcept;
 
-  /// Faults of ESCs, bus and kill switch; null: none. It must outlive the link.
+  /// Faults of ESCs, power module, bus and kill switch; null: none. It must outlive the link.
   void connect(const sitl::FaultLine* faults) noexcept { faults_ = faults; }
   /// A twin for tests: the kill switch has no effect.
   void ignore_kill_switch() noexcept { ignores_kill_switch_ = true; }
@@ -45,12 +47,16 @@ class ActuatorLink final : public firmware_if::Motors {
   [[nodiscard]] const std::array<double, 4>& throttle() const noexcept { return turning_; }
   /// How long the most silent ESC has not been heard.
   [[nodiscard]] Nanos esc_silence(MonotonicTime now) const noexcept;
+  /// What the power module said, 0 .. 1 in whole percent, rounded down. NaN: nothing for half a second (five
+  /// of its messages), or nothing usable.
+  [[nodiscard]] double charge_ratio(MonotonicTime now) const noexcept;
 
   [[nodiscard]] const firmware_if::dronecan::Node& node() const noexcept { return node_; }
   [[nodiscard]] const firmware_if::TransmitGate& gate() const noexcept { return gate_; }
 
  private:
   void break_lines(MonotonicTime now) noexcept;
+  [[nodiscard]] double break_battery(double charge_ratio) noexcept;
   [[nodiscard]] double break_esc(std::size_t i, double ratio, MonotonicTime now) noexcept;
 
   sitl::FakeCan bus_;
@@ -59,6 +65,7 @@ class ActuatorLink final : public firmware_if::Motors {
   std::array<firmware_if::dronecan::Reassembler::Session, 32> sessions_{};
   firmware_if::dronecan::Node node_;
   std::array<sitl::FakeEsc, 4> escs_;
+  sitl::FakePowerModule power_module_;
   sitl::FakeGpioInput kill_open_;
   sitl::FakeGpioInput kill_closed_;
   firmware_if::KillSwitch kill_switch_;
@@ -71,6 +78,7 @@ class ActuatorLink final : public firmware_if::Motors {
   bool bus_off_{false};
   bool pulse_{false};
   std::array<double, 4> turning_{};  ///< What the motors were given last.
+  double sound_charge_ratio_{1.0};   ///< The last one before a fault of the power module.
 };
 
 }  // namespace roborun::app

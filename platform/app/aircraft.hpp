@@ -11,7 +11,7 @@ namespace roborun::app {
 
 /// What the failsafe asks for besides the sensors.
 struct AircraftHealth {
-  double battery_ratio{};  ///< NaN: the battery's monitor says nothing usable.
+  double battery_ratio{};  ///< Of a full charge. NaN: the battery's monitor says nothing usable.
   Nanos esc_silence{};     ///< How long the most silent ESC has not been heard.
   bool hears_operator{};   ///< In this frame.
   bool killed{};           ///< By the kill switch, for good.

@@ -12,7 +12,8 @@
 
 namespace roborun::app {
 
-/// The vehicle's end of the bus, and that of each ESC.
+/// The vehicle's end of the bus, and that of each ESC (whatever else is simulated speaks through one of
+/// these).
 class MotorBus {
  public:
   virtual ~MotorBus() = default;

@@ -1,8 +1,6 @@
 /// Vehicle, motors' bus and navigation sensors of a simulated flight, and who takes pictures on the way.
 #pragma once
 
-#include <limits>
-
 #include "platform/app/actuator_link.hpp"
 #include "platform/app/aircraft.hpp"
 #include "platform/app/mission.hpp"
@@ -49,7 +47,7 @@ class SimulatedAircraft final : public Aircraft {
       // What was sent at the end of a minor frame reaches the motors in the middle of the next one: four
       // throttles are on the bus for 0.13 ms, and an ESC has a cycle of its own.
       vehicle_.step(minor_frame_ / 2);
-      actuators_.advance(now_ + minor_frame_ / 2, vehicle_);
+      actuators_.advance(now_ + minor_frame_ / 2, vehicle_.state().battery_ratio, vehicle_);
       vehicle_.step(minor_frame_ / 2);
       now_ += minor_frame_;
       sensors_.sample(now_, vehicle_.state());
@@ -61,7 +59,7 @@ class SimulatedAircraft final : public Aircraft {
   [[nodiscard]] firmware_if::Barometer& barometer() noexcept override { return sensors_; }
   [[nodiscard]] firmware_if::Motors& motors() noexcept override { return actuators_; }
   [[nodiscard]] AircraftHealth health(MonotonicTime now) noexcept override {
-    return {battery_ratio(), actuators_.esc_silence(now), hears_operator(), actuators_.killed()};
+    return {actuators_.charge_ratio(now), actuators_.esc_silence(now), hears_operator(), actuators_.killed()};
   }
   void terminate() noexcept override { actuators_.terminate(); }
   void disarm() noexcept override { actuators_.disarm(); }
@@ -74,18 +72,6 @@ class SimulatedAircraft final : public Aircraft {
  private:
   [[nodiscard]] sitl::FaultKind fault_of(sitl::Component component) const noexcept {
     return faults_ != nullptr ? faults_->of(component) : sitl::FaultKind::kNone;
-  }
-  [[nodiscard]] double battery_ratio() noexcept {
-    switch (fault_of(sitl::Component::kBattery)) {
-      case sitl::FaultKind::kNone:
-        return last_battery_ratio_ = vehicle_.state().battery_ratio;
-      case sitl::FaultKind::kStuck:
-        return last_battery_ratio_;
-      case sitl::FaultKind::kWrong:
-        return 0.05;
-      default:
-        return std::numeric_limits<double>::quiet_NaN();
-    }
   }
   /// The simulator's operator always is heard, unless the link has a fault.
   [[nodiscard]] bool hears_operator() const noexcept {
@@ -101,7 +87,6 @@ class SimulatedAircraft final : public Aircraft {
   Nanos minor_frame_;
   MonotonicTime now_{};
   const sitl::FaultLine* faults_{nullptr};
-  double last_battery_ratio_{1.0};
 };
 
 }  // namespace roborun::app

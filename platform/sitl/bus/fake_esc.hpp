@@ -1,11 +1,9 @@
 /// A speed controller on the bus: obeys RawCommand, stops by itself when nobody commands, tells its state.
 #pragma once
 
-#include <array>
 #include <cstdint>
 
-#include "firmware_if/can.hpp"
-#include "firmware_if/dronecan/transfer.hpp"
+#include "platform/sitl/bus/fake_node.hpp"
 
 namespace roborun::sitl {
 
@@ -20,10 +18,9 @@ class FakeEsc {
   };
   FakeEsc(const Config& config, firmware_if::CanBus& bus) noexcept
       : config_(config),
-        bus_(bus),
-        reassembler_(firmware_if::dronecan::kAllTypes, sessions_, config.node_id) {}
-  FakeEsc(const FakeEsc&) = delete;  // the reassembler looks into our own sessions
-  FakeEsc& operator=(const FakeEsc&) = delete;
+        ear_(bus),
+        status_(bus, config.node_id, 20, Nanos{100'000'000}),
+        heartbeat_(bus, config.node_id) {}
 
   /// Reads what came, sends what is due. The thrust ratio it gives the motor now, 0 .. 1.
   double step(MonotonicTime now) noexcept;
@@ -34,22 +31,15 @@ class FakeEsc {
   [[nodiscard]] std::uint64_t commands() const noexcept { return commands_; }
 
  private:
-  template <typename T>
-  void say(const T& message, std::uint8_t priority, std::uint8_t& transfer_id, MonotonicTime now) noexcept;
-
   Config config_;
-  firmware_if::CanBus& bus_;
-  std::array<firmware_if::dronecan::Reassembler::Session, 4> sessions_{};
-  firmware_if::dronecan::Reassembler reassembler_;
+  FakeEar<firmware_if::dronecan::EscRawCommand> ear_;
+  FakeVoice<firmware_if::dronecan::EscStatus> status_;
+  FakeHeartbeat heartbeat_;
   bool ready_{false};  ///< It was told zero.
   bool silent_{false};
   std::int16_t throttle_{0};
   MonotonicTime heard_{};
   MonotonicTime last_thrust_{};
-  MonotonicTime next_status_{};
-  MonotonicTime next_node_status_{};
-  std::uint8_t status_transfer_id_{0};
-  std::uint8_t node_status_transfer_id_{0};
   std::uint64_t commands_{0};
 };
 

@@ -314,7 +314,7 @@ TEST(Reassembly, DeliversNothingForbiddenFromAMillionMutatedFrames) {
   std::uint64_t state = 42;
   const auto random = [&state](std::uint64_t below) {
     state = state * 6364136223846793005ULL + 1442695040888963407ULL;
-    return (state >> 33U) % below;
+    return static_cast<std::size_t>((state >> 33U) % below);
   };
   Feed feed;
   ReferenceModel model;
@@ -376,7 +376,7 @@ TEST(Reassembly, SurvivesAMillionFramesOfNoise) {
   const test::NoAllocScope scope;
   for (int i = 0; i < 1'000'000; ++i) {
     CanFrame f;
-    const DataType& type = kAllTypes.at(random() % kAllTypes.size());
+    const DataType& type = kAllTypes.at(static_cast<std::size_t>(random() % kAllTypes.size()));
     f.id = static_cast<std::uint32_t>(random()) & 0x1fffffffU;
     if (i % 2 == 0) f.id = (f.id & 0x1f00007fU) | (std::uint32_t{type.id} << 8U);
     f.size = static_cast<std::uint8_t>(random() % 10);
