@@ -6,15 +6,15 @@
 namespace roborun::core {
 
 std::size_t DurationHistogram::bucket_of(std::uint64_t ns) noexcept {
-  if (ns < kSub) return ns;
+  if (ns < kSub) return static_cast<std::size_t>(ns);
   const auto shift = static_cast<std::size_t>(std::bit_width(ns)) - 7;
-  return std::min((shift + 1) * kSub + ((ns >> shift) - kSub), kBuckets - 1);
+  return std::min((shift + 1) * kSub + static_cast<std::size_t>((ns >> shift) - kSub), kBuckets - 1);
 }
 
 std::uint64_t DurationHistogram::upper_end_ns(std::size_t bucket) noexcept {
   if (bucket < kSub) return bucket;
   const std::size_t shift = bucket / kSub - 1;
-  return ((bucket % kSub + kSub + 1) << shift) - 1;
+  return (std::uint64_t{bucket % kSub + kSub + 1} << shift) - 1;
 }
 
 void DurationHistogram::add(Nanos duration) noexcept {

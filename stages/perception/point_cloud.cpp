@@ -27,7 +27,7 @@ bool PointCloud::add(const Vector3& p_W, double cell_m) noexcept {
   }
   key |= std::uint64_t{1} << 63U;
   const std::size_t mask = grid_.size() - 1;
-  std::size_t slot = core::mix64(key) & mask;
+  std::size_t slot = static_cast<std::size_t>(core::mix64(key)) & mask;
   while (grid_[slot].key != 0 && grid_[slot].key != key)
     slot = (slot + 1) & mask;  // bounded: never more than 3/4 full
   if (grid_[slot].key == 0) {
