@@ -32,8 +32,7 @@ struct Header {
   double resolution_m{};
 };
 
-/// Why a file is refused; empty: it is not. Handed up to where it is thrown: to unwind one call more costs
-/// more than to read most files.
+/// Why a file is refused; empty: it is not.
 using Refusal = std::string;
 
 void check(const Refusal& refusal, const std::string& name) {
@@ -145,18 +144,23 @@ Refusal walk(std::span<const unsigned char> data, bool full, LeafFunction&& on_l
 
 }  // namespace
 
-OctomapLeaves read_octomap(std::span<const unsigned char> bytes, bool full, const std::string& name) {
+std::string try_read_octomap(std::span<const unsigned char> bytes, bool full, OctomapLeaves& map) {
   Header header;
-  check(parse_header(bytes, full, header), name);
-  OctomapLeaves map;
+  if (Refusal refusal = parse_header(bytes, full, header); !refusal.empty()) return refusal;
   map.resolution_m = header.resolution_m;
+  map.leaves.clear();
   map.leaves.reserve(bytes.size() / 8);  // about as many as a sparse tree has
   // File order is Morton order, because children come by number: x, then y, then z.
   const auto add = [&](const Leaf& leaf, bool occupied) {
     map.leaves.push_back({leaf.morton, static_cast<std::int32_t>(leaf.size), occupied});
   };
-  check(walk(bytes.subspan(header.data), full, add), name);
-  if (map.leaves.empty()) check(kEmpty, name);
+  Refusal refusal = walk(bytes.subspan(header.data), full, add);
+  return refusal.empty() && map.leaves.empty() ? kEmpty : refusal;
+}
+
+OctomapLeaves read_octomap(std::span<const unsigned char> bytes, bool full, const std::string& name) {
+  OctomapLeaves map;
+  check(try_read_octomap(bytes, full, map), name);
   return map;
 }
 

@@ -49,6 +49,10 @@ struct OctomapLeaves {
 /// the number of bytes. Throws InputError for what is truncated, too long, too deep, empty or not OctoMap.
 [[nodiscard]] OctomapLeaves read_octomap(std::span<const unsigned char> bytes, bool full,
                                          const std::string& name);
+/// The same without an exception, which costs more than to read most files: why it is refused; empty: it is
+/// not, and `map` holds it.
+[[nodiscard]] std::string try_read_octomap(std::span<const unsigned char> bytes, bool full,
+                                           OctomapLeaves& map);
 /// At most 64 MiB from disk. Throws InputError.
 [[nodiscard]] OctomapLeaves load_octomap(const std::string& path);
 /// The bytes of a file. .ot holds the log-odds of OctoMap's clamping limits (0.97 and 0.12). Precondition:
