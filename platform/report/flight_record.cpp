@@ -6,7 +6,7 @@
 namespace roborun::report {
 namespace {
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kEveryPoint = 5;  // 10 Hz to 2 Hz
 constexpr std::size_t kPathFields = 5;

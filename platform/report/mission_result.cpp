@@ -4,9 +4,13 @@
 #include <nlohmann/json.hpp>
 
 namespace roborun::report {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+}  // namespace
 
 std::string to_json(const MissionResult& r) {
-  using Json = nlohmann::ordered_json;
   Json json;
   json["design"] = r.design;
   json["profile"] = r.profile;

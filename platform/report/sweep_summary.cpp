@@ -11,6 +11,8 @@
 namespace roborun::report {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Two-sided 95 % quantile of Student's t.
@@ -250,7 +252,6 @@ std::string sweep_table(const std::vector<SweepRow>& rows) {
 }
 
 std::string sweep_json(const std::string& suite, const std::vector<SweepRow>& rows, bool complete) {
-  using Json = nlohmann::ordered_json;
   Json profiles = Json::object();
   for (const DesignSummary& s : summarise(rows)) {
     Json json{{"missions", s.missions}, {"reached", s.reached}, {"collided", s.collided}};
