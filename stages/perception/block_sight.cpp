@@ -535,27 +535,19 @@ StripSeen tile_steps_lanes(const DepthStrip& strip, int shift, DepthPyramid::Ent
   return seen;
 }
 
-PixelCounts pixel_counts_lanes(std::span<const float> depth_m, float range_m) {
+std::size_t informed_pixels_lanes(std::span<const float> depth_m) {
   const Floats d;
   const Ints di;
   const std::size_t lanes = hn::Lanes(d);
-  const auto range = hn::Set(d, range_m), zero = hn::Zero(d);
-  const auto minus_one = [&](auto mask) { return hn::VecFromMask(di, hn::RebindMask(di, mask)); };
-  auto informed = hn::Zero(di), surfaces = hn::Zero(di);
+  auto informed = hn::Zero(di);
   std::size_t i = 0;
   for (; i + lanes <= depth_m.size(); i += lanes) {
-    const auto raw = hn::LoadU(d, depth_m.data() + i);
-    const auto known = hn::Gt(raw, zero);
-    informed = hn::Sub(informed, minus_one(known));
-    surfaces = hn::Sub(surfaces, minus_one(hn::And(known, hn::Lt(raw, range))));
+    const auto known = hn::Gt(hn::LoadU(d, depth_m.data() + i), hn::Zero(d));
+    informed = hn::Sub(informed, hn::VecFromMask(di, hn::RebindMask(di, known)));
   }
-  PixelCounts counts{static_cast<std::size_t>(hn::GetLane(hn::SumOfLanes(di, informed))),
-                     static_cast<std::size_t>(hn::GetLane(hn::SumOfLanes(di, surfaces)))};
-  for (; i < depth_m.size(); ++i) {
-    counts.informed += depth_m[i] > 0.0F ? 1U : 0U;
-    counts.surfaces += depth_m[i] > 0.0F && depth_m[i] < range_m ? 1U : 0U;
-  }
-  return counts;
+  auto count = static_cast<std::size_t>(hn::GetLane(hn::SumOfLanes(di, informed)));
+  for (; i < depth_m.size(); ++i) count += depth_m[i] > 0.0F ? 1U : 0U;
+  return count;
 }
 
 void tile_boxes_lanes(const TileLine& line, const TileEntries& tiles, TileRow& row) {
@@ -666,7 +658,7 @@ HWY_EXPORT(see_children_lanes);
 HWY_EXPORT(see_brick_lanes);
 HWY_EXPORT(end_cells_lanes);
 HWY_EXPORT(tile_steps_lanes);
-HWY_EXPORT(pixel_counts_lanes);
+HWY_EXPORT(informed_pixels_lanes);
 HWY_EXPORT(tile_boxes_lanes);
 HWY_EXPORT(least_of_four_lanes);
 HWY_EXPORT(brick_flags_lanes);
@@ -725,8 +717,8 @@ StripSeen tile_steps(const DepthStrip& strip, int shift, DepthPyramid::Entry* en
   return HWY_DYNAMIC_DISPATCH(tile_steps_lanes)(strip, shift, entry);
 }
 
-PixelCounts pixel_counts(std::span<const float> depth_m, float range_m) noexcept {
-  return HWY_DYNAMIC_DISPATCH(pixel_counts_lanes)(depth_m, range_m);
+std::size_t informed_pixels(std::span<const float> depth_m) noexcept {
+  return HWY_DYNAMIC_DISPATCH(informed_pixels_lanes)(depth_m);
 }
 
 void tile_boxes(const TileLine& line, const TileEntries& tiles, TileRow& row) noexcept {

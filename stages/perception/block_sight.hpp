@@ -123,11 +123,8 @@ struct StripSeen {
 /// information has no part in them.
 [[nodiscard]] StripSeen tile_steps(const DepthStrip& strip, int shift, DepthPyramid::Entry* entry) noexcept;
 
-/// Of an image: pixels with information, and those of them that show a surface.
-struct PixelCounts {
-  std::size_t informed{}, surfaces{};
-};
-[[nodiscard]] PixelCounts pixel_counts(std::span<const float> depth_m, float range_m) noexcept;
+/// How many pixels of an image have information.
+[[nodiscard]] std::size_t informed_pixels(std::span<const float> depth_m) noexcept;
 
 /// A row of tiles in space, in cells of any size: as PixelLine, for the tiles' middles. `half`: how much a
 /// direction differs at most within a tile.

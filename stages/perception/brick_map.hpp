@@ -92,7 +92,8 @@ class BrickMap final : public OccupancyMap, private MapView {
 
   [[nodiscard]] std::size_t usable_frames(const IntegrationRequest& request,
                                           IntegrationResult& result) noexcept;
-  /// A frame without any surface, where the map has surfaces in its view: more likely a white image.
+  /// Of a frame without any surface: the map has surfaces in its view, so that it is more likely a white
+  /// image.
   [[nodiscard]] bool is_white(const PosedDepthFrame& posed, std::span<const Vector3> moved_W) const noexcept;
   /// A unit is what v0 is spent in: a brick, or a block of 2^3 bricks (one cell of the coarsest level) if p0
   /// is that coarse or v0 is enough for everything in reach.

@@ -87,7 +87,7 @@ bool BrickMap::is_white(const PosedDepthFrame& posed, std::span<const Vector3> m
   constexpr double kMoved_m = 1.5;  // about twice a body's radius
   constexpr double kStep_m = 0.5 * kBrick_m, kFineStep_m = 0.5 * kFinestCell_m;
   const firmware_if::DepthFrame& frame = posed.frame;
-  if (posed.is_cloud || pixel_counts(frame.depth_m, frame.range_m).surfaces > 0) return false;
+  if (posed.is_cloud) return false;
   const double end_m = 0.8 * static_cast<double>(frame.range_m);
   const auto moved_nearby = [&moved_W](const Vector3& p_W) {
     return std::any_of(moved_W.begin(), moved_W.end(), [&p_W](const Vector3& m_W) {

@@ -36,10 +36,6 @@ bool is_informed(const PosedDepthFrame& posed, std::size_t informed_count) noexc
   return static_cast<double>(informed_count) >= (posed.is_cloud ? 1.0 : kLeastInformedRatio * pixels);
 }
 
-std::size_t informed_count(const firmware_if::DepthFrame& frame) noexcept {
-  return pixel_counts(frame.depth_m, frame.range_m).informed;
-}
-
 }  // namespace
 
 Status check_shape(const PosedDepthFrame& posed) noexcept {
@@ -55,7 +51,7 @@ Status check_shape(const PosedDepthFrame& posed) noexcept {
 
 Status check_frame(const PosedDepthFrame& posed) noexcept {
   if (check_shape(posed) != Status::kOk) return Status::kInvalidArgument;
-  return is_informed(posed, informed_count(posed.frame)) ? Status::kOk : Status::kInvalidArgument;
+  return is_informed(posed, informed_pixels(posed.frame.depth_m)) ? Status::kOk : Status::kInvalidArgument;
 }
 
 void FrameGuard::begin(std::span<const PosedDepthFrame> scan) noexcept {
@@ -87,7 +83,7 @@ bool FrameGuard::frozen(const firmware_if::DepthFrame& frame) noexcept {
 
 Status FrameGuard::check(const PosedDepthFrame& posed) noexcept {
   if (check_shape(posed) != Status::kOk) return Status::kInvalidArgument;
-  return check(posed, informed_count(posed.frame));
+  return check(posed, informed_pixels(posed.frame.depth_m));
 }
 
 Status FrameGuard::check(const PosedDepthFrame& posed, std::size_t informed_count) noexcept {
