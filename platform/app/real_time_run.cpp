@@ -18,6 +18,7 @@
 #include "platform/app/flight_system.hpp"
 #include "platform/app/simulated_aircraft.hpp"
 #include "platform/rt/host_identity.hpp"
+#include "platform/rt/idle_latency.hpp"
 #include "platform/rt/lane_thread.hpp"
 #include "platform/rt/memory_lock.hpp"
 #include "platform/rt/service_notifier.hpp"
@@ -258,6 +259,7 @@ void RealTimeRun::fill_commands(report::AuditReport& report) const {
 
 report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress) {
   report::AuditReport report;
+  const rt::IdleLatencyHold idle;
   const Vector3 start_W = aircraft_.vehicle().state().p_WB;
   {
     const Load load(config_.load);
@@ -319,6 +321,7 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
                      {"cpus", fmt::format("{}", id.cpus)},
                      {"governor", id.governor},
                      {"isolated", id.isolated},
+                     {"idle_latency", idle.describe()},
                      {"sched_rt_runtime_us", id.rt_runtime}};
   report.trace = std::move(trace_);
   return report;

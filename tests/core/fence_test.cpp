@@ -22,7 +22,7 @@ struct Node {
 FencePoint metres(const Node& n) {
   return {static_cast<double>(n.x) / 1024.0, static_cast<double>(n.y) / 1024.0};
 }
-__extension__ using Wide = __int128;
+using Wide = std::int64_t;  // coordinates below 2^26: products below 2^53
 
 Wide cross(const Node& a, const Node& b, const Node& c) {
   return Wide{b.x - a.x} * (c.y - a.y) - Wide{b.y - a.y} * (c.x - a.x);

@@ -251,7 +251,7 @@ class OctomapBackend final : public OccupancyMap, private MapView {
         const std::uint8_t value = tree.isNodeOccupied(*it) ? kOccupied : kFree;
         for (std::int64_t z = low[2]; z < high[2]; ++z) {
           for (std::int64_t y = low[1]; y < high[1]; ++y) {
-            const auto row = state.begin() + (z * fine[1] + y) * fine[0];
+            std::uint8_t* row = state.data() + (z * fine[1] + y) * fine[0];
             std::fill(row + low[0], row + high[0], value);
           }
         }

@@ -111,8 +111,9 @@ ob::SpaceInformationPtr make_ompl_space(const MapView& view, const Aabb& bounds_
   const auto space = std::make_shared<ob::RealVectorStateSpace>(3);
   ob::RealVectorBounds bounds(3);
   for (unsigned i = 0; i < 3; ++i) {
-    bounds.setLow(i, bounds_W.min_W[i]);
-    bounds.setHigh(i, bounds_W.max_W[i]);
+    const auto axis = static_cast<Eigen::Index>(i);
+    bounds.setLow(i, bounds_W.min_W[axis]);
+    bounds.setHigh(i, bounds_W.max_W[axis]);
   }
   space->setBounds(bounds);
   auto info = std::make_shared<ob::SpaceInformation>(space);
@@ -130,8 +131,9 @@ ob::ProblemDefinitionPtr make_ompl_problem(const ob::SpaceInformationPtr& info, 
   ob::ScopedState<ob::RealVectorStateSpace> start(info);
   ob::ScopedState<ob::RealVectorStateSpace> goal(info);
   for (unsigned i = 0; i < 3; ++i) {
-    start[i] = start_W[i];
-    goal[i] = goal_W[i];
+    const auto axis = static_cast<Eigen::Index>(i);
+    start[i] = start_W[axis];
+    goal[i] = goal_W[axis];
   }
   problem->setStartAndGoalStates(start, goal, tolerance_m);
   problem->setOptimizationObjective(std::make_shared<ob::PathLengthOptimizationObjective>(info));

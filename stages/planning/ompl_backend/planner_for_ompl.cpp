@@ -49,10 +49,8 @@ class PlannerForOmpl final : public ob::Planner {
     PlanRequest request;
     request.start_W = to_vector(pdef_->getStartState(0));
     request.goal_W = to_vector(goal->getState());
-    for (unsigned i = 0; i < 3; ++i) {
-      request.bounds_W.min_W[i] = bounds.low[i];
-      request.bounds_W.max_W[i] = bounds.high[i];
-    }
+    request.bounds_W.min_W = Vector3(bounds.low[0], bounds.low[1], bounds.low[2]);
+    request.bounds_W.max_W = Vector3(bounds.high[0], bounds.high[1], bounds.high[2]);
     request.radius_m = radius_m_;
     request.volume_m3 = std::numeric_limits<double>::infinity();
     request.horizon_m = 2.0 * request.bounds_W.size().norm();
@@ -68,7 +66,7 @@ class PlannerForOmpl final : public ob::Planner {
     auto path = std::make_shared<ompl::geometric::PathGeometric>(si_);
     ob::ScopedState<ob::RealVectorStateSpace> state(si_);
     for (const Vector3& p_W : result.path_W) {
-      for (unsigned i = 0; i < 3; ++i) state[i] = p_W[i];
+      for (unsigned i = 0; i < 3; ++i) state[i] = p_W[static_cast<Eigen::Index>(i)];
       path->append(state.get());
     }
     pdef_->addSolutionPath(path, !result.reaches_goal, (result.path_W.back() - request.goal_W).norm(), name_);
