@@ -32,7 +32,7 @@ MonotonicTime now() {
 
 void sleep_until(MonotonicTime at) {
   const std::int64_t ns = at.time_since_epoch().count();
-  const timespec t{ns / 1'000'000'000, ns % 1'000'000'000};
+  const timespec t{static_cast<time_t>(ns / 1'000'000'000), static_cast<long>(ns % 1'000'000'000)};
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr) != 0) {
   }
 }

@@ -74,7 +74,7 @@ std::vector<Node> random_polygon(CounterRng& rng, std::int64_t range, FenceSide 
   for (;;) {
     std::vector<Node> nodes;
     std::vector<FencePoint> points;
-    const std::size_t count = 3 + rng.below(6);
+    const std::size_t count = 3 + static_cast<std::size_t>(rng.below(6));
     for (std::size_t i = 0; i < count; ++i) {
       nodes.push_back(random_node(rng, range));
       points.push_back(metres(nodes.back()));
@@ -94,7 +94,7 @@ TEST(Fence, DecidesAMillionPointsAsTheSlowExactReference) {
     const std::vector<Node> polygon = random_polygon(rng, range, side, fence);
     for (int i = 0; i < 1000; ++i) {
       Node p = random_node(rng, range + range / 8 + 1);
-      if (i % 10 == 0) p = polygon[rng.below(polygon.size())];
+      if (i % 10 == 0) p = polygon[static_cast<std::size_t>(rng.below(polygon.size()))];
       const Where truth = where(polygon, p);
       ++seen[static_cast<std::size_t>(truth)];
       const bool wanted = truth == (side == FenceSide::kKeepIn ? Where::kInside : Where::kOutside);

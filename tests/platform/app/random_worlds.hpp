@@ -37,7 +37,7 @@ inline sitl::World random_world(std::uint64_t number) {
   d.bounds_W = {Vector3(-6, -10, 1.5), Vector3(36, 10, 6)};
   d.start_W = Vector3(0, 0, 3);
   d.goal_W = Vector3(30, 0, 3);
-  const std::size_t count = 4 + rng.below(7);
+  const std::size_t count = 4 + static_cast<std::size_t>(rng.below(7));
   while (d.pillars.size() < count) {
     const sitl::Pillar p{rng.uniform(3.0, 27.0), rng.uniform(-8.0, 8.0), rng.uniform(0.4, 1.5)};
     const double start_m = std::hypot(p.x_m, p.y_m) - p.radius_m;

@@ -43,7 +43,7 @@ TEST(PastStates, CatchesUpWithAnotherAfterAnyNumberOfSteps) {
     const auto steps = static_cast<int>(rng.below(round % 10 == 0 ? 700 : 5));
     for (int i = 0; i < steps; ++i) newest.add(state(++n));
     if (rng.below(20) == 0) newest.clear();
-    PastStates& sut = copy[rng.below(3)];
+    PastStates& sut = copy[static_cast<std::size_t>(rng.below(3))];
     sut.catch_up(newest);
     for (int back = 0; back < 220; ++back) {
       const PastStates::Past* a = newest.at(at_ms(2.5 * (n - back)));

@@ -481,7 +481,8 @@ TEST(DepthPyramid, BoundsEveryRectangle) {
   core::CounterRng rng(3);
   std::vector<float> depth(96 * 80);
   for (float& d : depth) d = static_cast<float>(rng.uniform(0.5, 30.0));
-  for (int i = 0; i < 50; ++i) depth[rng.below(depth.size())] = std::numeric_limits<float>::quiet_NaN();
+  for (int i = 0; i < 50; ++i)
+    depth[static_cast<std::size_t>(rng.below(depth.size()))] = std::numeric_limits<float>::quiet_NaN();
   firmware_if::DepthFrame frame;
   frame.width = 96;
   frame.height = 80;

@@ -85,7 +85,7 @@ TEST_P(OctomapFile, SurvivesAnyDamage) {
   for (int i = 0; i < 3000; ++i) {
     std::string damaged = whole;
     for (std::uint64_t k = 0; k <= rng.below(4); ++k)
-      damaged[rng.below(damaged.size())] = static_cast<char>(rng.below(256));
+      damaged[static_cast<std::size_t>(rng.below(damaged.size()))] = static_cast<char>(rng.below(256));
     try {
       const VoxelGrid grid = parse(damaged, GetParam());
       ASSERT_LE(grid.count()[0], 1 << 16);

@@ -37,12 +37,13 @@ TEST_P(OctomapFuzz, SurvivesHalfAMillionHostileFiles) {
   int refused = 0;
   int accepted = 0;
   for (int i = 0; i < 500000; ++i) {
-    std::string bytes = whole.substr(0, i % 4 == 0 ? rng.below(whole.size() + 1) : whole.size());
+    std::string bytes =
+        whole.substr(0, i % 4 == 0 ? static_cast<std::size_t>(rng.below(whole.size() + 1)) : whole.size());
     if (i % 3 == 0) {
       for (std::size_t k = header; k < bytes.size(); ++k) bytes[k] = static_cast<char>(rng.below(256));
     }
     for (std::uint64_t k = rng.below(5); k > 0 && !bytes.empty(); --k)
-      bytes[rng.below(bytes.size())] = static_cast<char>(rng.below(256));
+      bytes[static_cast<std::size_t>(rng.below(bytes.size()))] = static_cast<char>(rng.below(256));
     try {
       const OctomapLeaves map = read_octomap(
           {reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()}, GetParam(), "memory");
