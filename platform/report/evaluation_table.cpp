@@ -16,11 +16,11 @@ std::string kernels_of(const MissionResult& r) {
   return r.map == "own" && r.planner == "own" ? "own" : fmt::format("{} + {}", r.map, r.planner);
 }
 
-/// In the order of first appearance.
-std::vector<std::string> names_of(const std::vector<SweepRow>& rows,
-                                  std::string (*name)(const MissionResult&)) {
+/// Of sweep rows or flights, in the order of first appearance.
+template <typename Rows>
+std::vector<std::string> names_of(const Rows& rows, std::string (*name)(const MissionResult&)) {
   std::vector<std::string> names;
-  for (const SweepRow& row : rows) {
+  for (const auto& row : rows) {
     if (std::find(names.begin(), names.end(), name(row.result)) == names.end())
       names.push_back(name(row.result));
   }
@@ -80,12 +80,7 @@ std::string zone_table(std::span<const MissionReport> flights, const std::vector
   for (const char* stage : {"cloud", "governor", "map", "export", "planner", "smoother"})
     text += fmt::format(" {:>8}", stage);
   text += '\n';
-  std::vector<std::string> designs;
-  for (const MissionReport& f : flights) {
-    if (std::find(designs.begin(), designs.end(), f.result.design) == designs.end())
-      designs.push_back(f.result.design);
-  }
-  for (const std::string& design : designs) {
+  for (const std::string& design : names_of(flights, design_of)) {
     for (std::size_t zone = 0; zone <= borders_m.size(); ++zone) {
       std::vector<double> whole_s;
       ZoneTime all;
