@@ -45,7 +45,7 @@ class GpioSim {
     const std::string pull = high ? "pull-up" : "pull-down";
     EXPECT_EQ(pwrite(pulls_.at(i), pull.data(), pull.size(), 0), static_cast<ssize_t>(pull.size()));
   }
-  /// What stands on the wire, in volts' terms: true is high, whatever the line's owner calls active.
+  /// The wire's level, whatever the line's owner calls active.
   [[nodiscard]] bool high(std::size_t i) const {
     std::string text;
     std::ifstream(wire(i) / "value") >> text;
