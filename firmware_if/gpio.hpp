@@ -13,7 +13,7 @@ enum class GpioBias : std::uint8_t { kNone, kPullUp, kPullDown };
 /// Contract (proved on every implementation by tests/contract/gpio_contract_test.cpp):
 ///  1. No call blocks or allocates.
 ///  2. active() is the level now: true is active, whatever the polarity of the wire.
-///  3. next_edge() hands out edges oldest first; kNotReady: none. At most 16 wait, the oldest are lost first:
+///  3. next_edge() hands out edges oldest first; kNotReady: none. At most 16 wait; newer ones are then lost:
 ///     so the level is read as well.
 ///  4. A line that is gone or was never there answers kIo, and never a level.
 struct GpioEdge {
