@@ -5,6 +5,9 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <fstream>
+#include <string>
 
 #include "platform/app/board_profile.hpp"
 #include "platform/app/real_time_run.hpp"
@@ -30,6 +33,23 @@ class RealTimeRun : public ::testing::Test {
   static const report::AuditSlot& slot(const report::AuditReport& r, core::SlotId id) {
     return r.slots[static_cast<std::size_t>(id)];
   }
+  /// Of a flight that nothing is to end. Flown again, three times in all, where the watchdog ended it while
+  /// the hypervisor took 50 ms or more of a CPU: then the machine stood still and not the flight lane.
+  report::AuditReport fly_to_the_end() const {
+    for (int tries = 1;; ++tries) {
+      const std::uint64_t before = stolen_ticks();
+      report::AuditReport r = run_real_time(world, config, {});
+      if (r.stopped_by.empty() || tries == 3 || stolen_ticks() - before < 5) return r;
+    }
+  }
+  /// Of 10 ms, from all CPUs, since the machine started.
+  static std::uint64_t stolen_ticks() {
+    std::ifstream file("/proc/stat");
+    std::string field;
+    std::uint64_t ticks = 0;
+    for (int i = 0; i <= 7; ++i) file >> field;
+    return file >> ticks ? ticks : 0;
+  }
   sitl::World world;
   RealTimeConfig config;
 };
@@ -37,7 +57,7 @@ class RealTimeRun : public ::testing::Test {
 TEST_F(RealTimeRun, FliesWithoutAHeapCallOrAPageFault) {
   config.seconds = 9.0;
   config.trace = true;
-  const report::AuditReport r = run_real_time(world, config, {});
+  const report::AuditReport r = fly_to_the_end();
   EXPECT_GT(r.decisions, 0U) << "it never got as far as a decision: nothing was tested";
   EXPECT_GT(lane(r, core::LaneId::kFlight).frames, 1000U);
   EXPECT_GT(slot(r, core::SlotId::kPlanner).time.count, 0U);
@@ -77,7 +97,7 @@ TEST_F(RealTimeRun, AStageThatSpinsInTheDecisionLaneTakesNoFrameFromTheFlightLan
   config.seconds = 4.0;
   // The gather slot runs from the first frame on: 2 s without giving its CPU away.
   config.inject = Injection{core::SlotId::kGather, Nanos{2'000'000'000}, 100, 1, false};
-  const report::AuditReport r = run_real_time(world, config, {});
+  const report::AuditReport r = fly_to_the_end();
   const report::AuditLane& decision = lane(r, core::LaneId::kDecision);
   ASSERT_GE(decision.response.max_us, 2e6) << "the fault was not there";
   EXPECT_GE(decision.slips, 700U);
@@ -94,7 +114,7 @@ TEST_F(RealTimeRun, AStageThatSpinsInTheDecisionLaneTakesNoFrameFromTheFlightLan
 TEST_F(RealTimeRun, WhereADecisionNeverEndsTheFlightLaneStopsTheVehicleAndGoesOn) {
   config.seconds = 16.0;
   config.inject = Injection{core::SlotId::kMap, Nanos{3'600'000'000'000}, 3, 1, false};
-  const report::AuditReport r = run_real_time(world, config, {});
+  const report::AuditReport r = fly_to_the_end();
   ASSERT_EQ(r.decisions, 4U) << "the fourth one is the last";
   EXPECT_EQ(r.decision_stalls, 1U);
   EXPECT_EQ(r.stalled_in, "map");
@@ -116,7 +136,7 @@ TEST_F(RealTimeRun, AFlightLaneThatHangsEndsTheRunByName) {
 TEST_F(RealTimeRun, NoCatchUpAfterAStallInTheFlightLane) {
   config.seconds = 2.0;
   config.inject = Injection{core::SlotId::kTrack, Nanos{100'000'000}, 100, 1, false};
-  const report::AuditReport r = run_real_time(world, config, {});
+  const report::AuditReport r = fly_to_the_end();
   const report::AuditLane& flight = lane(r, core::LaneId::kFlight);
   EXPECT_GE(flight.slips, 39U);
   EXPECT_LE(static_cast<double>(flight.frames + flight.slips), 400.0 * r.seconds + 2.0)
@@ -129,7 +149,7 @@ TEST_F(RealTimeRun, NoCatchUpAfterAStallInTheFlightLane) {
 TEST_F(RealTimeRun, FliesAtTheRateAskedFor) {
   config.seconds = 2.0;
   config.mission.minor_frame = core::minor_frame_of(100);
-  const report::AuditReport r = run_real_time(world, config, {});
+  const report::AuditReport r = fly_to_the_end();
   const report::AuditLane& flight = lane(r, core::LaneId::kFlight);
   EXPECT_EQ(r.rate_Hz, 100.0);
   EXPECT_GT(flight.frames, 0U);
