@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "core/precision.hpp"
 #include "stages/perception/block_sight.hpp"
@@ -467,19 +468,17 @@ void end_cells_lanes(const PixelLine& line, std::span<const float> depth_m, floa
   }
 }
 
-/// to[i] = the least of two entries, from[2 i] and from[2 i + 1]; one vector of them.
-HWY_INLINE void least_of_pairs(const std::int32_t* from, std::int32_t* to) {
-#if HWY_TARGET == HWY_SCALAR
-  const std::int32_t a = from[0], b = from[1];
-  *to = std::min(a & 0xFFFF, b & 0xFFFF) | (std::min(a >> 16U, b >> 16U) << 16U);
-#else
+/// to[i] = keep(from[2 i], from[2 i + 1]); one vector of them.
+template <class Keep>
+HWY_INLINE void keep_of_pairs(const std::int32_t* from, std::int32_t* to, const Keep& keep) {
   const Ints di;
-  const hn::Repartition<std::int16_t, Ints> d16;
+#if HWY_TARGET == HWY_SCALAR
+  const auto even = hn::LoadU(di, from), odd = hn::LoadU(di, from + 1);
+#else
   const auto low = hn::LoadU(di, from), high = hn::LoadU(di, from + hn::Lanes(di));
-  const auto even = hn::BitCast(d16, hn::ConcatEven(di, high, low));
-  const auto odd = hn::BitCast(d16, hn::ConcatOdd(di, high, low));
-  hn::StoreU(hn::BitCast(di, hn::Min(even, odd)), di, to);
+  const auto even = hn::ConcatEven(di, high, low), odd = hn::ConcatOdd(di, high, low);
 #endif
+  hn::StoreU(keep(even, odd), di, to);
 }
 
 StripSeen tile_steps_lanes(const DepthStrip& strip, int shift, DepthPyramid::Entry* entry) {
@@ -487,31 +486,37 @@ StripSeen tile_steps_lanes(const DepthStrip& strip, int shift, DepthPyramid::Ent
   const Ints di;
   const std::size_t lanes = hn::Lanes(d);
   const auto range = hn::Set(d, strip.range_m), scale = hn::Set(d, strip.steps_per_m);
-  const auto all = hn::Set(di, DepthPyramid::kMaxSteps), one = hn::Set(di, 1);
   const auto none = hn::Set(d, 2.0F * kMaxRange_m);
+  const auto least_nan =
+      hn::Add(hn::BitCast(di, hn::Set(d, std::numeric_limits<float>::infinity())), hn::Set(di, 1));
+  const auto min = [](auto a, auto b) { return hn::Min(a, b); };
+  const auto max = [](auto a, auto b) { return hn::Max(a, b); };
+  // The bits of floats > 0 have the order of the floats.
   constexpr std::size_t kBeyond = 24;
-  alignas(32) std::int32_t column[DepthPyramid::kMaxPixels + 8 + kBeyond];
-  StripSeen seen{true, false};
+  alignas(32) std::int32_t least[DepthPyramid::kMaxPixels + 8 + kBeyond];
+  alignas(32) std::int32_t most[DepthPyramid::kMaxPixels + 8 + kBeyond];
+  StripSeen seen;
   const auto some = [&](const float* depth, std::size_t stride, std::size_t u) {
-    // Steps grow with depth, so that the least and the most can be found first. No information: no part.
-    auto least = none, most = hn::Zero(d);
-    auto known = hn::Gt(hn::LoadU(d, depth), hn::Zero(d));
-    for (std::size_t v = 0; v < strip.rows; ++v) {
-      const auto raw = hn::LoadU(d, depth + v * stride);
-      const auto known_here = hn::Gt(raw, hn::Zero(d));
-      known = hn::And(known, known_here);
-      least = hn::Min(least, hn::IfThenElse(known_here, raw, none));
-      most = hn::Max(most, hn::IfThenElseZero(known_here, raw));
+    auto low = hn::BitCast(di, hn::LoadU(d, depth)), high = low;
+    for (std::size_t v = 1; v < strip.rows; ++v) {
+      const auto raw = hn::BitCast(di, hn::LoadU(d, depth + v * stride));
+      low = hn::Min(low, raw);
+      high = hn::Max(high, raw);
     }
-    seen.complete = seen.complete && hn::AllTrue(d, known);
-    seen.surface = seen.surface || !hn::AllFalse(d, hn::Lt(least, range));
-    const auto steps = [&](auto z) { return hn::ConvertTo(di, hn::Mul(hn::Min(z, range), scale)); };
-    const auto within = [&](auto z) { return hn::RebindMask(di, hn::Lt(z, range)); };
-    const auto least_steps = hn::IfThenElse(within(least), steps(least), all);
-    const auto not_most = hn::IfThenElseZero(within(most), hn::Sub(hn::Sub(all, steps(most)), one));
-    const auto nothing = hn::RebindMask(di, hn::Eq(most, hn::Zero(d)));
-    hn::StoreU(hn::Or(least_steps, hn::ShiftLeft<16>(hn::IfThenElse(nothing, all, not_most))), di,
-               column + u);
+    // As integers, what is not > 0 lies below it, and so do NaNs with a sign; the others lie above infinity.
+    if (!hn::AllTrue(di, hn::And(hn::Gt(low, hn::Zero(di)), hn::Lt(high, least_nan)))) {
+      seen.incomplete |= std::uint64_t{1} << (u / 8);
+      low = hn::BitCast(di, none);
+      high = hn::Zero(di);
+      for (std::size_t v = 0; v < strip.rows; ++v) {
+        const auto raw = hn::LoadU(d, depth + v * stride);
+        const auto known = hn::Gt(raw, hn::Zero(d));
+        low = hn::Min(low, hn::BitCast(di, hn::IfThenElse(known, raw, none)));
+        high = hn::Max(high, hn::BitCast(di, hn::IfThenElseZero(known, raw)));
+      }
+    }
+    hn::StoreU(low, di, least + u);
+    hn::StoreU(high, di, most + u);
   };
   std::size_t u = 0;
   for (; u + lanes <= strip.width; u += lanes) some(strip.depth_m + u, strip.width, u);
@@ -522,16 +527,34 @@ StripSeen tile_steps_lanes(const DepthStrip& strip, int shift, DepthPyramid::Ent
         tail[8 * v + i] = strip.depth_m[v * strip.width + std::min(u + i, strip.width - 1)];
     some(tail, 8, u);
   }
-  // Neighbours in pairs, until a column is a tile. Beyond the last one stands what no minimum notices.
+  // Neighbours in pairs, until a column is a tile. Beyond the last one stands what changes nothing.
   const std::size_t tiles =
       (strip.width + (std::size_t{1} << static_cast<unsigned>(shift)) - 1) >> static_cast<unsigned>(shift);
   const std::size_t stored = (strip.width + lanes - 1) / lanes * lanes;
-  std::fill_n(column + stored, kBeyond, DepthPyramid::kMaxSteps | (DepthPyramid::kMaxSteps << 16U));
+  for (std::size_t i = stored; i < stored + kBeyond; i += lanes) {
+    hn::Store(hn::BitCast(di, none), di, least + i);
+    hn::Store(hn::Zero(di), di, most + i);
+  }
   for (unsigned k = 1; k <= static_cast<unsigned>(shift); ++k) {
     const std::size_t count = tiles << (static_cast<unsigned>(shift) - k);
-    for (std::size_t x = 0; x < count; x += lanes) least_of_pairs(column + 2 * x, column + x);
+    for (std::size_t x = 0; x < count; x += lanes) {
+      keep_of_pairs(least + 2 * x, least + x, min);
+      keep_of_pairs(most + 2 * x, most + x, max);
+    }
   }
-  std::memcpy(entry, column, tiles * sizeof(DepthPyramid::Entry));
+  const auto all = hn::Set(di, DepthPyramid::kMaxSteps), one = hn::Set(di, 1);
+  const auto steps = [&](auto z) { return hn::ConvertTo(di, hn::Mul(hn::Min(z, range), scale)); };
+  for (std::size_t x = 0; x < tiles; x += lanes) {
+    const auto near = hn::BitCast(d, hn::LoadU(di, least + x)), far = hn::BitCast(d, hn::LoadU(di, most + x));
+    const auto ends = hn::Lt(near, range), all_end = hn::Lt(far, range);
+    seen.surface = seen.surface || !hn::AllFalse(d, ends);
+    const auto least_steps = hn::IfThenElse(hn::RebindMask(di, ends), steps(near), all);
+    const auto not_most =
+        hn::IfThenElseZero(hn::RebindMask(di, all_end), hn::Sub(hn::Sub(all, steps(far)), one));
+    const auto nothing = hn::RebindMask(di, hn::Eq(far, hn::Zero(d)));
+    hn::StoreU(hn::Or(least_steps, hn::ShiftLeft<16>(hn::IfThenElse(nothing, all, not_most))), di, least + x);
+  }
+  std::memcpy(entry, least, tiles * sizeof(DepthPyramid::Entry));
   return seen;
 }
 

@@ -115,9 +115,11 @@ struct DepthStrip {
   std::size_t width{}, rows{};  ///< Pixels; at most kMaxTile rows.
   float range_m{}, steps_per_m{};
 };
-/// Whether all pixels of a strip have information, and whether one of them shows a surface.
+/// Of a strip: bit i says that of the columns [8 i, 8 i + 8) a pixel has no information; and whether one
+/// shows a surface.
 struct StripSeen {
-  bool complete{}, surface{};
+  std::uint64_t incomplete{};
+  bool surface{};
 };
 /// Bounds of tiles of 2^shift columns and all rows of the strip, in steps of DepthPyramid. A pixel without
 /// information has no part in them.

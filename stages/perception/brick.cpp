@@ -67,13 +67,6 @@ void Brick::refresh() noexcept {
   stale = false;
 }
 
-std::uint8_t Brick::flags(int level, std::uint32_t morton) const noexcept {
-  if (level > 0) return mip[mip_index(level, morton)];
-  const unsigned value = cell(morton);
-  if (value == evidence::kUnknown) return content::kUnknown;
-  return evidence::is_occupied(value) ? content::kOccupied : content::kFree;
-}
-
 void Brick::set_cell(std::uint32_t morton, unsigned value) noexcept {
   const unsigned shift = 4U * (morton % kCellsPerWord);
   Word& w = word[morton / kCellsPerWord];

@@ -64,7 +64,7 @@ struct Brick {
   }
   void set_cell(std::uint32_t morton, unsigned value) noexcept;
   /// Flags of the cell of `level` (0 .. 4) with this Morton index. After refresh(). O(1).
-  [[nodiscard]] std::uint8_t flags(int level, std::uint32_t morton) const noexcept;
+  [[nodiscard]] inline std::uint8_t flags(int level, std::uint32_t morton) const noexcept;
   /// Free evidence for the blocks of `level` with Morton index 8 * parent + i, for each bit i of `blocks`.
   void add_free(int level, std::uint32_t parent, std::uint8_t blocks) noexcept;
   /// A surface in this cell of level 0.
@@ -75,6 +75,13 @@ struct Brick {
 [[nodiscard]] constexpr std::size_t mip_index(int level, std::uint32_t morton) noexcept {
   constexpr std::array<std::size_t, 5> kStart{0, 0, 512, 576, 584};
   return kStart[static_cast<std::size_t>(level)] + morton;
+}
+
+inline std::uint8_t Brick::flags(int level, std::uint32_t morton) const noexcept {
+  if (level > 0) return mip[mip_index(level, morton)];
+  const unsigned value = cell(morton);
+  if (value == evidence::kUnknown) return content::kUnknown;
+  return evidence::is_occupied(value) ? content::kOccupied : content::kFree;
 }
 
 inline constexpr std::array<std::uint16_t, 16> kMortonSpread{0x000, 0x001, 0x008, 0x009, 0x040, 0x041,

@@ -134,7 +134,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   void add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
                   core::Work& work) noexcept;
   /// Tile by tile: pixels are looked at where they may end in space of which something was known before.
-  void add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, core::Work& work) noexcept;
+  void add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, int level,
+                 core::Work& work) noexcept;
   /// True if nothing is known of all space in which this tile of tiles_ may end: then that is all to be done.
   [[nodiscard]] bool note_surface(std::size_t tile) noexcept;
   /// Whether something is known of what a brick and the cells [low, high] of a tile share. Not if this scan

@@ -135,16 +135,20 @@ double BrickMap::volume_m3(const Vector3& center_W, double edge_m) const noexcep
 }
 
 std::size_t BrickMap::order_units(const IntegrationRequest& request) noexcept {
-  // Everything that a camera can see, as a box around all of them; a cubic frustum of range r reaches
-  // sqrt(3) r.
+  // Everything that a camera can see, as a box around all of them.
+  constexpr double kRounding_m = kFinestCell_m;
   Vector3 low = cameras_.camera[0].p_WC;
   Vector3 high = low;
   for (std::size_t i = 0; i < cameras_.count; ++i) {
     const SightCamera& c = cameras_.camera[i];
-    const double t = static_cast<double>(c.tan_half);
-    const double reach_m = static_cast<double>(c.range_m) * std::sqrt(1.0 + 2.0 * t * t);
-    low = low.cwiseMin(c.p_WC - Vector3::Constant(reach_m));
-    high = high.cwiseMax(c.p_WC + Vector3::Constant(reach_m));
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto k = static_cast<std::size_t>(axis);
+      const double ahead = static_cast<double>(c.range_m) * static_cast<double>(c.R_CW[k]);
+      const double aside = static_cast<double>(c.range_m) * static_cast<double>(c.tan_half) *
+                           static_cast<double>(std::fabs(c.R_CW[3 + k]) + std::fabs(c.R_CW[6 + k]));
+      low[axis] = std::min(low[axis], c.p_WC[axis] + std::min(ahead - aside, 0.0) - kRounding_m);
+      high[axis] = std::max(high[axis], c.p_WC[axis] + std::max(ahead + aside, 0.0) + kRounding_m);
+    }
   }
   const Aabb& bounds = config_.bounds_W;
   low = low.cwiseMax(bounds.min_W).cwiseMin(bounds.max_W);
@@ -235,11 +239,15 @@ std::size_t BrickMap::clear_units(std::size_t count, const IntegrationRequest& r
   std::array<Vector3, BlocksSeen::kMost> center_W;
   for (std::size_t first = 0; first < count; first += BlocksSeen::kMost) {
     const std::size_t here = std::min(BlocksSeen::kMost, count - first);
-    for (std::size_t i = 0; i < here; ++i) center_W[i] = unit_center_W(unit_at(order_[first + i]));
+    std::array<Position, BlocksSeen::kMost> unit_of;
+    for (std::size_t i = 0; i < here; ++i) {
+      unit_of[i] = unit_at(order_[first + i]);
+      center_W[i] = unit_center_W(unit_of[i]);
+    }
     const BlocksSeen seen = see_blocks(cameras_, unit_level_, std::span(center_W).first(here));
     work.units += (here + 7) / 8;
     for (std::size_t i = 0; i < here; ++i) {
-      const Position unit = unit_at(order_[first + i]);
+      const Position& unit = unit_of[i];
       if (((seen.free >> i) & 1U) != 0) {
         free_unit(unit);
         work.volume_m3 += volume_m3(center_W[i], cell_size_m(unit_level_));
@@ -347,13 +355,14 @@ bool BrickMap::note_surface(std::size_t tile) noexcept {
   return true;
 }
 
-void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, core::Work& work) noexcept {
+void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, int level,
+                         core::Work& work) noexcept {
   const firmware_if::DepthFrame& frame = camera.posed->frame;
   const Matrix3& R = camera.posed->X_WC.R_RT;
-  // Two tiles of the pyramid a side: every second entry of the level above them.
-  const DepthPyramid::Level& pairs = image.level(image.tiles().shift + 1);
-  const std::size_t side = std::size_t{2} << static_cast<unsigned>(pairs.shift);
-  const std::size_t columns = (static_cast<std::size_t>(pairs.width) + 1) / 2;
+  // Two tiles of the pyramid a side, four for blocks: every second entry of a level above them.
+  const DepthPyramid::Level& wide = image.level(image.tiles().shift + (level >= kBlockLevel ? 2 : 1));
+  const std::size_t side = std::size_t{2} << static_cast<unsigned>(wide.shift);
+  const std::size_t columns = (static_cast<std::size_t>(wide.width) + 1) / 2;
   const double tile_pitch = camera.pitch * static_cast<double>(side);
   const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kTileCell_m;
   TileLine line;
@@ -366,8 +375,8 @@ void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image,
     line.half[k] =
         static_cast<float>(0.5 * tile_pitch * (std::fabs(R(axis, 1)) + std::fabs(R(axis, 2))) / kTileCell_m);
   }
-  const DepthPyramid::Entry* entry = pairs.entry;
-  for (std::size_t v = 0; v < frame.height; v += side, entry += 2 * static_cast<std::size_t>(pairs.width)) {
+  const DepthPyramid::Entry* entry = wide.entry;
+  for (std::size_t v = 0; v < frame.height; v += side, entry += 2 * static_cast<std::size_t>(wide.width)) {
     const double half = 0.5 * static_cast<double>(side);
     line.first = direction(camera, half, static_cast<double>(v) + half, kTileCell_m);
     tile_boxes(line, {entry, 2, columns}, tiles_);
@@ -401,7 +410,7 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work)
           static_cast<float>(-camera.pitch / kFinestCell_m * camera.posed->X_WC.R_RT(axis, 1));
     }
     if (camera.coarse) {
-      add_tiles(camera, *pyramid_[i], work);
+      add_tiles(camera, *pyramid_[i], request.level, work);
     } else {
       for (std::size_t v = 0; v < frame.height; ++v) add_pixels(camera, v, 0, frame.width, work);
     }

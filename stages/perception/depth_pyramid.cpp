@@ -1,6 +1,7 @@
 #include "stages/perception/depth_pyramid.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "stages/perception/block_sight.hpp"
@@ -66,21 +67,19 @@ void DepthPyramid::fill_tiles(const firmware_if::DepthFrame& frame, unsigned shi
     const std::size_t rows = std::min(side, frame.height - y);
     const DepthStrip strip{frame.depth_m.data() + y * frame.width, frame.width, rows, frame.range_m,
                            steps_per_m_};
-    // The rows of a strip are read side by side, which no cache foresees.
-    constexpr std::size_t kLine = 64 / sizeof(float);
-    const std::size_t next = (y + rows) * frame.width;
-    const std::size_t after = std::min(next + side * frame.width, frame.depth_m.size());
-    for (std::size_t i = next; i < after; i += kLine) __builtin_prefetch(&frame.depth_m[i]);
     const StripSeen seen = tile_steps(strip, static_cast<int>(shift), tile);
     shows_surface_ = shows_surface_ || seen.surface;
     informed_count_ += rows * frame.width;
-    if (seen.complete) continue;
-    for (std::size_t v = y; v < y + rows; ++v) {
-      for (std::size_t u = 0; u < frame.width; ++u) {
-        if (frame.depth_m[v * frame.width + u] > 0.0F) continue;
-        --informed_count_;
-        Entry& entry = tile[u >> shift];
-        entry = min_of(entry, entry_of(bridged_m(frame, u, v), frame.range_m, steps_per_m_));
+    for (std::uint64_t bits = seen.incomplete; bits != 0; bits &= bits - 1) {
+      const std::size_t first = 8 * static_cast<std::size_t>(std::countr_zero(bits));
+      const std::size_t end = std::min<std::size_t>(first + 8, frame.width);
+      for (std::size_t v = y; v < y + rows; ++v) {
+        for (std::size_t u = first; u < end; ++u) {
+          if (frame.depth_m[v * frame.width + u] > 0.0F) continue;
+          --informed_count_;
+          Entry& entry = tile[u >> shift];
+          entry = min_of(entry, entry_of(bridged_m(frame, u, v), frame.range_m, steps_per_m_));
+        }
       }
     }
   }
