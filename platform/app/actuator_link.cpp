@@ -28,17 +28,18 @@ firmware_if::CanBus& power_module_end(sitl::FakeCan& simulated, MotorBus* outsid
 
 }  // namespace
 
-ActuatorLink::ActuatorLink(std::uint64_t seed, Nanos minor_frame, MotorBus* outside) noexcept
+ActuatorLink::ActuatorLink(std::uint64_t seed, Nanos minor_frame, const RealActuators& real) noexcept
     : bus_(kBitrate_bps, seed),
       port_(bus_.port(0)),
-      gate_({.beat_timeout = 3 * minor_frame}, node_end(port_, outside)),
-      node_({.command_period = minor_frame}, gate_, node_end(port_, outside), sessions_),
-      escs_{{{{.node_id = kFirstEscNode, .index = 0}, esc_end(bus_, outside, 0)},
-             {{.node_id = kFirstEscNode + 1, .index = 1}, esc_end(bus_, outside, 1)},
-             {{.node_id = kFirstEscNode + 2, .index = 2}, esc_end(bus_, outside, 2)},
-             {{.node_id = kFirstEscNode + 3, .index = 3}, esc_end(bus_, outside, 3)}}},
-      power_module_(kPowerModuleNode, power_module_end(bus_, outside)),
-      kill_switch_(kill_open_, kill_closed_) {
+      gate_({.beat_timeout = 3 * minor_frame}, node_end(port_, real.bus)),
+      node_({.command_period = minor_frame}, gate_, node_end(port_, real.bus), sessions_),
+      escs_{{{{.node_id = kFirstEscNode, .index = 0}, esc_end(bus_, real.bus, 0)},
+             {{.node_id = kFirstEscNode + 1, .index = 1}, esc_end(bus_, real.bus, 1)},
+             {{.node_id = kFirstEscNode + 2, .index = 2}, esc_end(bus_, real.bus, 2)},
+             {{.node_id = kFirstEscNode + 3, .index = 3}, esc_end(bus_, real.bus, 3)}}},
+      power_module_(kPowerModuleNode, power_module_end(bus_, real.bus)),
+      kill_switch_(real.kill != nullptr ? real.kill->open() : kill_open_,
+                   real.kill != nullptr ? real.kill->closed() : kill_closed_) {
   kill_closed_.drive(true, {});
 }
 

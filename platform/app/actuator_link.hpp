@@ -8,6 +8,7 @@
 #include "firmware_if/dronecan/node.hpp"
 #include "firmware_if/kill_switch.hpp"
 #include "firmware_if/motors.hpp"
+#include "platform/app/kill_lines.hpp"
 #include "platform/app/motor_bus.hpp"
 #include "platform/sitl/bus/fake_can.hpp"
 #include "platform/sitl/bus/fake_esc.hpp"
@@ -17,14 +18,20 @@
 
 namespace roborun::app {
 
+/// What of the actuator side is real; null: it is simulated.
+struct RealActuators {
+  MotorBus* bus{nullptr};
+  KernelKillLines* kill{nullptr};
+};
+
 /// The simulated actuator side of the vehicle. Each minor frame: the flight lane may command(), then step()
 /// sends; the world calls advance() while time passes. Arms itself with the first command: the operator of a
 /// simulation. No allocation after construction.
 class ActuatorLink final : public firmware_if::Motors {
  public:
-  /// The gate closes after three minor frames without a command. `outside` carries the frames instead of the
-  /// simulated bus (whose faults have no effect then), and must outlive the link; null: none.
-  ActuatorLink(std::uint64_t seed, Nanos minor_frame, MotorBus* outside) noexcept;
+  /// The gate closes after three minor frames without a command. What is real takes the place of what is
+  /// simulated (whose faults have no effect then), and must outlive the link.
+  ActuatorLink(std::uint64_t seed, Nanos minor_frame, const RealActuators& real) noexcept;
   ActuatorLink(const ActuatorLink&) = delete;
   ActuatorLink& operator=(const ActuatorLink&) = delete;
 
@@ -38,7 +45,7 @@ class ActuatorLink final : public firmware_if::Motors {
   void connect(const sitl::FaultLine* faults) noexcept { faults_ = faults; }
   /// A twin for tests: the kill switch has no effect.
   void ignore_kill_switch() noexcept { ignores_kill_switch_ = true; }
-  [[nodiscard]] bool killed() const noexcept { return kill_switch_.killed(); }
+  [[nodiscard]] const firmware_if::KillSwitch& kill_switch() const noexcept { return kill_switch_; }
   /// Motors off for good, by the runtime itself.
   void terminate() noexcept { gate_.kill(); }
   /// After a landing: zeros, and no arming by a later command.

@@ -38,6 +38,9 @@ struct AuditOptions {
   double tolerance_ratio{1.5};
   std::string spin;
   std::vector<std::string> can;
+  std::vector<std::string> kill_lines;
+  bool active_low{false};
+  bool pull_up{false};
   bool props_off{false};
 };
 
@@ -110,6 +113,11 @@ int audit(const AuditOptions& options) {
   config.load = options.load;
   config.trace = !options.trace.empty();
   if (!options.can.empty()) config.can = {options.can[0], options.can[1]};
+  if (!options.kill_lines.empty()) {
+    const auto bias = options.pull_up ? firmware_if::GpioBias::kPullUp : firmware_if::GpioBias::kNone;
+    config.kill = {gpio::LineConfig{options.kill_lines[0], options.active_low, bias},
+                   gpio::LineConfig{options.kill_lines[1], options.active_low, bias}};
+  }
   const bool terminal = isatty(STDERR_FILENO) != 0;
   const report::AuditReport result = run_real_time(world, config, [&](double done_s) {
     if (terminal) fmt::print(stderr, "\raudit {:3.0f} of {:.0f} s   ", done_s, options.seconds);
@@ -181,6 +189,17 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
       ->delimiter(',');
   command->add_flag("--props-off", options->props_off,
                     "With --can: no propeller is on any motor of that bus");
+  auto* kill_lines = command->add_option(
+      "--kill-lines", options->kill_lines,
+      "A kill switch on lines of this machine: normally open and normally closed contact, each a name or "
+      "CHIP:OFFSET. Does not begin unless it stands on run; stops the motors when it does not any more");
+  kill_lines->expected(2)->delimiter(',');
+  command
+      ->add_flag("--active-low", options->active_low,
+                 "With --kill-lines: a closed contact pulls its line low")
+      ->needs(kill_lines);
+  command->add_flag("--pull-up", options->pull_up, "With --kill-lines: switch on the pull-up of the lines")
+      ->needs(kill_lines);
   command->add_option("--inject-spin", options->spin,
                       "A fault: SLOT:MILLISECONDS, busy in every run of that slot from the 400th (flight "
                       "lane) or the 5th on");

@@ -112,10 +112,12 @@ class RealTimeRun {
   void fill_lanes(report::AuditReport& report) const;
   void fill_slots(report::AuditReport& report) const;
   void fill_commands(report::AuditReport& report) const;
+  void fill_kill_switch(report::AuditReport& report) const;
 
   const RealTimeConfig& config_;
   std::vector<std::string> missing_;
   rt::MonotonicClock clock_;
+  std::unique_ptr<KernelKillLines> kill_lines_;
   std::unique_ptr<KernelMotorBus> motor_bus_;
   CameraServer cameras_;
   SimulatedAircraft aircraft_;
@@ -134,9 +136,10 @@ class RealTimeRun {
 
 RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
     : config_(config),
+      kill_lines_(config.kill ? std::make_unique<KernelKillLines>(*config.kill) : nullptr),
       motor_bus_(motor_bus_of(config, clock_)),
       cameras_(world, config.mission.camera, config.mission.seed),
-      aircraft_(world, config.mission, cameras_, motor_bus_.get()),
+      aircraft_(world, config.mission, cameras_, {motor_bus_.get(), kill_lines_.get()}),
       system_(world, config.mission, meter_, aircraft_, cameras_.cameras()),
       program_{Injected{system_.flight_program(), config.inject, over_},
                Injected{system_.decision_program(), config.inject, over_},
@@ -257,6 +260,17 @@ void RealTimeRun::fill_commands(report::AuditReport& report) const {
   path.gap = report::summarise(meter.gap());
 }
 
+void RealTimeRun::fill_kill_switch(report::AuditReport& report) const {
+  const firmware_if::KillSwitch& kill = aircraft_.actuators().kill_switch();
+  const firmware_if::KillSwitch::Counters& c = kill.counters();
+  report.kill_switch = {{(*config_.kill)[0].name, (*config_.kill)[1].name},
+                        c.samples,
+                        c.pressed,
+                        c.faults,
+                        c.glitches,
+                        kill.killed()};
+}
+
 report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress) {
   report::AuditReport report;
   const rt::IdleLatencyHold idle;
@@ -311,6 +325,7 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
   fill_lanes(report);
   fill_slots(report);
   if (motor_bus_) fill_commands(report);
+  if (kill_lines_) fill_kill_switch(report);
   report.pools = system_.pools();
   const rt::HostIdentity id = rt::identify_host();
   report.identity = {{"program", "roborun 0.1.0"},

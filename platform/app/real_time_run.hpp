@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/executive/frame_table.hpp"
+#include "platform/app/kill_lines.hpp"
 #include "platform/app/mission.hpp"
 #include "platform/report/audit_report.hpp"
 #include "platform/rt/heap_seal.hpp"
@@ -33,13 +34,15 @@ struct RealTimeConfig {
   std::optional<Injection> inject{};
   /// CAN interfaces of the kernel for the motors' bus: the vehicle's and the ESCs' (KernelMotorBus).
   std::optional<std::array<std::string, 2>> can{};
+  std::optional<KillWiring> kill{};  ///< A kill switch on lines of the kernel.
 };
 
 /// Takes off in `world` and flies on towards its goal for so many seconds, hovering once it is there. Throws
 /// sitl::InputError if this machine cannot run it in real time (one line that names all that is missing) and
-/// best_effort is off, if stress-ng is wanted and not there, and as fly_mission(). `progress` (may be empty)
-/// is called about once a second with the seconds done. Under systemd it says READY=1 once the lanes run, and
-/// WATCHDOG=1 twenty times a second for as long as the flight lane keeps its releases.
+/// best_effort is off, if stress-ng is wanted and not there, if bus or kill lines cannot be had, and as
+/// fly_mission(). `progress` (may be empty) is called about once a second with the seconds done. Under
+/// systemd it says READY=1 once the lanes run, and WATCHDOG=1 twenty times a second for as long as the flight
+/// lane keeps its releases.
 [[nodiscard]] report::AuditReport run_real_time(const sitl::World& world, const RealTimeConfig& config,
                                                 const std::function<void(double)>& progress);
 

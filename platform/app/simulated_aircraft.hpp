@@ -18,15 +18,14 @@ class ExposureSink {
 
 class SimulatedAircraft final : public Aircraft {
  public:
-  /// On the ground below the start of `world`, which must outlive it as `cameras` and `motor_bus` must;
-  /// without a `motor_bus` commands go over a simulated one.
+  /// On the ground below the start of `world`, which must outlive it as `cameras` and what is `real` must.
   SimulatedAircraft(const sitl::World& world, const MissionConfig& config, ExposureSink& cameras,
-                    MotorBus* motor_bus = nullptr)
+                    const RealActuators& real = {})
       : vehicle_(config.vehicle, config.wind, Vector3(world.start_W().x(), world.start_W().y(), 0.0),
                  config.seed),
         sensors_(sitl::NavigationSensors(config.sensors, config.seed)),
         cameras_(cameras),
-        actuators_(config.seed, config.minor_frame, motor_bus),
+        actuators_(config.seed, config.minor_frame, real),
         minor_frame_(config.minor_frame) {
     if (!config.answers) actuators_.ignore_kill_switch();
   }
@@ -59,7 +58,8 @@ class SimulatedAircraft final : public Aircraft {
   [[nodiscard]] firmware_if::Barometer& barometer() noexcept override { return sensors_; }
   [[nodiscard]] firmware_if::Motors& motors() noexcept override { return actuators_; }
   [[nodiscard]] AircraftHealth health(MonotonicTime now) noexcept override {
-    return {actuators_.charge_ratio(now), actuators_.esc_silence(now), hears_operator(), actuators_.killed()};
+    return {actuators_.charge_ratio(now), actuators_.esc_silence(now), hears_operator(),
+            actuators_.kill_switch().killed()};
   }
   void terminate() noexcept override { actuators_.terminate(); }
   void disarm() noexcept override { actuators_.disarm(); }

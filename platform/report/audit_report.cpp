@@ -124,6 +124,11 @@ std::string to_json(const AuditReport& r) {
                      {"heard", c.heard},           {"lost", c.lost},         {"late", c.late},
                      {"age_us", timing(c.age)},    {"gap_us", timing(c.gap)}};
   }
+  if (r.kill_switch) {
+    const KillSwitchLog& k = *r.kill_switch;
+    j["kill_switch"] = {{"lines", k.lines},   {"samples", k.samples},   {"pressed", k.pressed},
+                        {"faults", k.faults}, {"glitches", k.glitches}, {"killed", k.killed}};
+  }
   j["lanes"] = Json::array();
   for (const AuditLane& l : r.lanes) j["lanes"].push_back(lane_json(l));
   j["slots"] = Json::array();
@@ -180,6 +185,13 @@ std::string audit_table(const AuditReport& r) {
         "longest gap {:.0f} us\n",
         c.interfaces[0], c.interfaces[1], c.sent, c.refused, c.lost, c.late, c.age.median_us, c.age.p999_us,
         c.age.max_us, c.gap.max_us);
+  }
+  if (r.kill_switch) {
+    const KillSwitchLog& k = *r.kill_switch;
+    text += fmt::format(
+        "kill switch on {} and {}: {} samples, {} pressed, {} with both the same, {} glitches; {}\n",
+        k.lines[0], k.lines[1], k.samples, k.pressed, k.faults, k.glitches,
+        k.killed ? "KILLED" : "not killed");
   }
   for (const auto& [name, count] : r.heap_sites) text += fmt::format("  heap: {} x {}\n", count, name);
   if (r.decision_stalls > 0)

@@ -60,6 +60,13 @@ struct CommandPath {
   TimingSummary gap;     ///< Between two at the ESCs.
 };
 
+/// What the contacts of a real kill switch said, sample by sample.
+struct KillSwitchLog {
+  std::array<std::string, 2> lines;  ///< Normally open, normally closed.
+  std::uint64_t samples{}, pressed{}, faults{}, glitches{};
+  bool killed{};
+};
+
 struct AuditReport {
   double seconds{};
   double rate_Hz{};    ///< Of the flight lane.
@@ -74,8 +81,9 @@ struct AuditReport {
   std::uint64_t decision_stalls{};  ///< Times that the watchdog found the decision lane hanging.
   std::string stalled_in;           ///< The slot of the last one.
   double flown_m{}, least_clearance_m{}, speed_mps{};  ///< The speed is that of the end.
-  std::string stopped_by;               ///< The slot whose overruns ended the run; empty if none did.
-  std::optional<CommandPath> commands;  ///< Nothing over the simulated bus.
+  std::string stopped_by;                    ///< The slot whose overruns ended the run; empty if none did.
+  std::optional<CommandPath> commands;       ///< Nothing over the simulated bus.
+  std::optional<KillSwitchLog> kill_switch;  ///< Nothing of the simulated one.
   std::vector<AuditLane> lanes;
   std::vector<AuditSlot> slots;
   std::vector<PoolUse> pools;

@@ -56,6 +56,8 @@ refuses "paper, host, cortex-a72, or a file" audit --profile x
 refuses "nope.toml" audit --settings nope.toml
 refuses "say --props-off" audit --can can0,can1
 refuses "nope0" audit --can nope0,nope0 --props-off --best-effort --profile paper
+refuses "not armed: line 'nope_open'" audit --kill-lines nope_open,nope_closed --best-effort --profile paper
+refuses "--kill-lines" audit --active-low
 refuses "100, 125, 160, 200, 250, 320 or 400" audit --rate 333
 refuses "100, 125, 160, 200, 250, 320 or 400" audit --rate 1000
 refuses "100, 125, 160, 200, 250, 320 or 400" audit --rate -400
