@@ -2,7 +2,7 @@
 # The distribution's compiler, a sysroot made by toolchain/sysroot, tests under qemu-user.
 set(CMAKE_SYSTEM_NAME Linux)
 set(CMAKE_CXX_COMPILER ${triplet}-g++)
-set(CMAKE_SYSROOT ${CMAKE_CURRENT_LIST_DIR}/../../build/sysroot-${debian_architecture})
+get_filename_component(CMAKE_SYSROOT ${CMAKE_CURRENT_LIST_DIR}/../../build/sysroot-${debian_architecture} ABSOLUTE)
 set(CMAKE_LIBRARY_ARCHITECTURE ${triplet})
 set(CMAKE_FIND_ROOT_PATH ${CMAKE_SYSROOT})
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
