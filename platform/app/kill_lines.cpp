@@ -15,9 +15,10 @@ KernelKillLines::KernelKillLines(const KillWiring& wiring) {
   if (now.released()) return;
   throw sitl::InputError("--kill-lines: not armed: " +
                          std::string(now.counters().pressed > 0
-                                         ? "the kill switch is pressed: release it"
-                                         : "both contacts say the same: a wire is broken or swapped (roborun "
-                                           "gpio check shows it)"));
+                                         ? "the kill switch is pressed, or its wires are swapped, or "
+                                           "--active-low is not how they are wired"
+                                         : "both contacts of the kill switch say the same, or one says "
+                                           "nothing: a wire is broken (roborun gpio check)"));
 }
 
 }  // namespace roborun::app

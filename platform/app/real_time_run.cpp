@@ -117,8 +117,8 @@ class RealTimeRun {
   const RealTimeConfig& config_;
   std::vector<std::string> missing_;
   rt::MonotonicClock clock_;
-  std::unique_ptr<KernelKillLines> kill_lines_;
   std::unique_ptr<KernelMotorBus> motor_bus_;
+  std::unique_ptr<KernelKillLines> kill_lines_;
   CameraServer cameras_;
   SimulatedAircraft aircraft_;
   core::ClockMeter meter_;
@@ -136,8 +136,8 @@ class RealTimeRun {
 
 RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
     : config_(config),
-      kill_lines_(config.kill ? std::make_unique<KernelKillLines>(*config.kill) : nullptr),
       motor_bus_(motor_bus_of(config, clock_)),
+      kill_lines_(config.kill ? std::make_unique<KernelKillLines>(*config.kill) : nullptr),
       cameras_(world, config.mission.camera, config.mission.seed),
       aircraft_(world, config.mission, cameras_, {motor_bus_.get(), kill_lines_.get()}),
       system_(world, config.mission, meter_, aircraft_, cameras_.cameras()),

@@ -122,8 +122,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   /// A camera whose surfaces are being written.
   struct SurfaceCamera {
     const PosedDepthFrame* posed{};
-    double pitch{};  ///< Of the pixels, at depth 1.
-    bool coarse{};   ///< p0 is a brick or more: surfaces in unknown bricks are noted, not written.
+    double column_pitch{}, row_pitch{};  ///< Of the pixels, at depth 1.
+    bool coarse{};  ///< p0 is a brick or more: surfaces in unknown bricks are noted, not written.
     PixelLine line{};
   };
   /// Of column u and row v of the image, in edges, for a depth of 1.
@@ -179,6 +179,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   std::span<std::uint32_t> order_;        ///< Units near the cameras, nearest to the trajectory first.
   std::span<std::uint16_t> order_key_;    ///< Of each unit of the map.
   int unit_level_{kBrickLevel};
+  Position first_unit_{}, last_unit_{};  ///< Of those near the cameras.
   std::size_t free_count_{0};
   std::size_t dirty_count_{0};
   FrameGuard guard_{};

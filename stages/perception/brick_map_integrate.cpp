@@ -160,10 +160,10 @@ std::size_t BrickMap::order_units(const IntegrationRequest& request) noexcept {
     return std::clamp(static_cast<std::int32_t>((p_m - corner_m) / cell_size_m(unit_level_)), 0,
                       (bricks >> (unit_level_ - kBrickLevel)) - 1);
   };
-  const Position first{index(low.x(), corner_W_.x(), nx_), index(low.y(), corner_W_.y(), ny_),
-                       index(low.z(), corner_W_.z(), nz_)};
-  const Position last{index(high.x(), corner_W_.x(), nx_), index(high.y(), corner_W_.y(), ny_),
-                      index(high.z(), corner_W_.z(), nz_)};
+  first_unit_ = {index(low.x(), corner_W_.x(), nx_), index(low.y(), corner_W_.y(), ny_),
+                 index(low.z(), corner_W_.z(), nz_)};
+  last_unit_ = {index(high.x(), corner_W_.x(), nx_), index(high.y(), corner_W_.y(), ny_),
+                index(high.z(), corner_W_.z(), nz_)};
 
   // Counting sort by distance to the trajectory: bounded, stable, no comparison of doubles.
   constexpr std::size_t kBuckets = 256;
@@ -175,10 +175,10 @@ std::size_t BrickMap::order_units(const IntegrationRequest& request) noexcept {
     return static_cast<std::uint16_t>(
         std::min(std::sqrt(nearest2) / kOrderStep_m, static_cast<double>(kBuckets - 1)));
   };
-  const auto for_each_unit = [&first, &last](auto&& on_unit) {
-    for (std::int32_t z = first.z; z <= last.z; ++z)
-      for (std::int32_t y = first.y; y <= last.y; ++y)
-        for (std::int32_t x = first.x; x <= last.x; ++x) on_unit(Position{x, y, z});
+  const auto for_each_unit = [this](auto&& on_unit) {
+    for (std::int32_t z = first_unit_.z; z <= last_unit_.z; ++z)
+      for (std::int32_t y = first_unit_.y; y <= last_unit_.y; ++y)
+        for (std::int32_t x = first_unit_.x; x <= last_unit_.x; ++x) on_unit(Position{x, y, z});
   };
   for_each_unit([&](const Position& unit) {
     const std::uint16_t key = key_of(unit_center_W(unit));
@@ -271,8 +271,8 @@ void BrickMap::free_unit(const Position& unit) noexcept {
 std::array<float, 3> BrickMap::direction(const SurfaceCamera& camera, double u, double v,
                                          double edge_m) noexcept {
   const Matrix3& R = camera.posed->X_WC.R_RT;
-  const double y = camera.pitch * (0.5 * camera.posed->frame.width - u);
-  const double z = camera.pitch * (0.5 * camera.posed->frame.height - v);
+  const double y = camera.column_pitch * (0.5 * camera.posed->frame.width - u);
+  const double z = camera.row_pitch * (0.5 * camera.posed->frame.height - v);
   std::array<float, 3> result{};
   for (int axis = 0; axis < 3; ++axis)
     result[static_cast<std::size_t>(axis)] =
@@ -282,7 +282,10 @@ std::array<float, 3> BrickMap::direction(const SurfaceCamera& camera, double u, 
 
 bool BrickMap::paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
   const int up = unit_level_ - kBrickLevel;
-  return order_key_[unit_index({bx >> up, by >> up, bz >> up})] * kOrderStep_m <= reach_m_;
+  const Position unit{bx >> up, by >> up, bz >> up};
+  const bool in_reach = unit.x >= first_unit_.x && unit.y >= first_unit_.y && unit.z >= first_unit_.z &&
+                        unit.x <= last_unit_.x && unit.y <= last_unit_.y && unit.z <= last_unit_.z;
+  return in_reach && order_key_[unit_index(unit)] * kOrderStep_m <= reach_m_;
 }
 
 void BrickMap::add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
@@ -363,7 +366,8 @@ void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image,
   const DepthPyramid::Level& wide = image.level(image.tiles().shift + (level >= kBlockLevel ? 2 : 1));
   const std::size_t side = std::size_t{2} << static_cast<unsigned>(wide.shift);
   const std::size_t columns = (static_cast<std::size_t>(wide.width) + 1) / 2;
-  const double tile_pitch = camera.pitch * static_cast<double>(side);
+  const double across = camera.column_pitch * static_cast<double>(side);
+  const double along = camera.row_pitch * static_cast<double>(side);
   const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kTileCell_m;
   TileLine line;
   line.steps_per_m = image.steps_per_m();
@@ -371,9 +375,9 @@ void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image,
     const auto k = static_cast<std::size_t>(axis);
     line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
     line.rest[k] = static_cast<float>(origin[axis] - line.origin[k]);
-    line.step[k] = static_cast<float>(-tile_pitch * R(axis, 1) / kTileCell_m);
-    line.half[k] =
-        static_cast<float>(0.5 * tile_pitch * (std::fabs(R(axis, 1)) + std::fabs(R(axis, 2))) / kTileCell_m);
+    line.step[k] = static_cast<float>(-across * R(axis, 1) / kTileCell_m);
+    line.half[k] = static_cast<float>(0.5 * (across * std::fabs(R(axis, 1)) + along * std::fabs(R(axis, 2))) /
+                                      kTileCell_m);
   }
   const DepthPyramid::Entry* entry = wide.entry;
   for (std::size_t v = 0; v < frame.height; v += side, entry += 2 * static_cast<std::size_t>(wide.width)) {
@@ -398,7 +402,9 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work)
     camera.posed = &request.frames[frame_of_[i]];
     camera.coarse = request.level >= kBrickLevel;
     const firmware_if::DepthFrame& frame = camera.posed->frame;
-    camera.pitch = 2.0 * static_cast<double>(frame.tan_half_fov_ratio) / frame.width;
+    const double across = 2.0 * static_cast<double>(frame.tan_half_fov_ratio);
+    camera.column_pitch = across / frame.width;
+    camera.row_pitch = across / frame.height;
     const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kFinestCell_m;
     camera.line.low = {low_.x, low_.y, low_.z};
     camera.line.high = {high_.x, high_.y, high_.z};
@@ -407,7 +413,7 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work)
       camera.line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
       camera.line.rest[k] = static_cast<float>(origin[axis] - camera.line.origin[k]);
       camera.line.step[k] =
-          static_cast<float>(-camera.pitch / kFinestCell_m * camera.posed->X_WC.R_RT(axis, 1));
+          static_cast<float>(-camera.column_pitch / kFinestCell_m * camera.posed->X_WC.R_RT(axis, 1));
     }
     if (camera.coarse) {
       add_tiles(camera, *pyramid_[i], request.level, work);

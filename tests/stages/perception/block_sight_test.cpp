@@ -72,6 +72,54 @@ TEST_F(BlockSight, IsBitEqualOnEveryInstructionSet) {
   EXPECT_NE(digests[0], digests[1]);
 }
 
+TEST_F(BlockSight, ATileKnowsTheLeastAndTheMostOfItsDepths) {
+  constexpr float kRange_m = 20.0F;
+  const float steps_per_m = static_cast<float>(DepthPyramid::kMaxSteps - 1) / kRange_m;
+  const float nan = std::numeric_limits<float>::quiet_NaN(),
+              infinity = std::numeric_limits<float>::infinity();
+  const std::array<float, 9> odd{nan, -nan, 0.0F, -0.0F, -1.0F, infinity, -infinity, 700.0F, kRange_m};
+  core::CounterRng rng(3);
+  const std::int64_t all = sight_instruction_sets();
+  for (int n = 0; n < 4000; ++n) {
+    const std::int64_t set = all & (std::int64_t{1} << rng.below(63));
+    if (set == 0) continue;
+    const InstructionSet only(set);
+    const std::size_t width = 8 + rng.below(n % 8 == 0 ? 505 : 60), rows = 1 + rng.below(kMaxTile);
+    const auto shift = static_cast<int>(rng.below(4));
+    std::vector<float> depth_m(width * rows);
+    const std::uint64_t odd_in = n % 3 == 0 ? 4 : 100;
+    for (float& d : depth_m)
+      d = rng.below(odd_in) == 0 ? odd[rng.below(odd.size())] : static_cast<float>(rng.uniform(0.1, 21.0));
+    const std::size_t side = std::size_t{1} << static_cast<unsigned>(shift),
+                      tiles = (width + side - 1) / side;
+    std::vector<DepthPyramid::Entry> entry(tiles);
+    const StripSeen seen =
+        tile_steps({depth_m.data(), width, rows, kRange_m, steps_per_m}, shift, entry.data());
+    std::uint64_t incomplete = 0;
+    bool surface = false;
+    for (std::size_t x = 0; x < tiles; ++x) {
+      std::int32_t least = DepthPyramid::kMaxSteps, not_most = DepthPyramid::kMaxSteps;
+      for (std::size_t v = 0; v < rows; ++v)
+        for (std::size_t u = x * side; u < std::min((x + 1) * side, width); ++u) {
+          const float d = depth_m[v * width + u];
+          if (!(d > 0.0F)) {
+            incomplete |= std::uint64_t{1} << (u / 8);
+            continue;
+          }
+          const auto steps = static_cast<std::int32_t>(d < kRange_m ? d * steps_per_m : 0.0F);
+          surface = surface || d < kRange_m;
+          least = std::min(least, d < kRange_m ? steps : DepthPyramid::kMaxSteps);
+          not_most = std::min(not_most, d < kRange_m ? DepthPyramid::kMaxSteps - steps - 1 : 0);
+        }
+      ASSERT_EQ(entry[x].least_steps, least) << width << " x " << rows << " by " << side << ", tile " << x;
+      ASSERT_EQ(entry[x].not_most_steps, not_most)
+          << width << " x " << rows << " by " << side << ", tile " << x;
+    }
+    ASSERT_EQ(seen.incomplete, incomplete);
+    ASSERT_EQ(seen.surface, surface);
+  }
+}
+
 TEST_F(BlockSight, ABlockIsFreeOnlyIfEveryRayThroughItSeesPastIt) {
   std::vector<std::byte> block(DepthPyramid::arena_bytes(45));
   core::Arena arena(block);

@@ -236,6 +236,32 @@ TEST_F(BrickMapTest, WhereAPixelOfACoarseLookEndsNothingStaysFree) {
   EXPECT_GT(ended_in_free_space, 500);
 }
 
+class NotSquare : public BrickMapTest, public ::testing::WithParamInterface<std::pair<int, int>> {};
+
+TEST_P(NotSquare, SurfacesAreWhereTheyAre) {
+  const std::array<Vector3, 1> here{at_};
+  const auto frames = scene_.look(at_, GetParam().first, 20.0F, GetParam().second);
+  ASSERT_EQ(sut_->integrate({frames, 0, kInfinity, here}, unlimited_, result_), Status::kOk);
+  core::Work work;
+  (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
+  std::uint64_t lookups = 0;
+  int found = 0;
+  for (double x = -13.35; x < 14; x += 0.3)
+    for (double y = -13.35; y < 14; y += 0.3)
+      for (double z = -0.45; z < 8; z += 0.3) {
+        if (sut_->view().at(Vector3(x, y, z), lookups) != CellState::kOccupied) continue;
+        ++found;
+        const Aabb around = Aabb::around(Vector3(x, y, z), 0.31);
+        bool solid = false;
+        for (const Aabb& box : scene_.solid)
+          solid = solid || ((box.min_W.array() <= around.max_W.array()).all() &&
+                            (box.max_W.array() >= around.min_W.array()).all());
+        ASSERT_TRUE(solid) << x << " " << y << " " << z;
+      }
+  EXPECT_GT(found, 500);
+}
+INSTANTIATE_TEST_SUITE_P(Images, NotSquare, ::testing::Values(std::pair{64, 40}, std::pair{40, 64}));
+
 TEST_F(BrickMapTest, ACoarseLookNotesSurfacesInUnknownBricksUntilAFinerOne) {
   const std::array<Vector3, 1> here{at_};
   const auto frames = scene_.look(at_);

@@ -38,9 +38,11 @@ struct Scene {
     }
     return best;
   }
-  /// Images of the six cameras at p_W, body axes along the world's. The spans live until the next call.
+  /// Images of the six cameras at p_W, body axes along the world's; square if `rows` is 0. The spans live
+  /// until the next call.
   [[nodiscard]] std::vector<stages::PosedDepthFrame> look(const Vector3& p_W, int pixels = 64,
-                                                          float range_m = 20.0F) {
+                                                          float range_m = 20.0F, int rows = 0) {
+    if (rows == 0) rows = pixels;
     const std::array<std::array<double, 9>, 6> mount{{{1, 0, 0, 0, 1, 0, 0, 0, 1},
                                                       {0, -1, 0, 1, 0, 0, 0, 0, 1},
                                                       {-1, 0, 0, 0, -1, 0, 0, 0, 1},
@@ -52,15 +54,16 @@ struct Scene {
       for (int i = 0; i < 9; ++i) frames[c].X_WC.R_RT(i / 3, i % 3) = mount[c][static_cast<std::size_t>(i)];
       frames[c].X_WC.p_RT = p_W;
       image[c].clear();
-      for (int v = 0; v < pixels; ++v) {
+      for (int v = 0; v < rows; ++v) {
         for (int u = 0; u < pixels; ++u) {
-          const Vector3 ray(1.0, 1.0 - (u + 0.5) * 2.0 / pixels, 1.0 - (v + 0.5) * 2.0 / pixels);
+          const Vector3 ray(1.0, 1.0 - (u + 0.5) * 2.0 / pixels, 1.0 - (v + 0.5) * 2.0 / rows);
           const double depth = hit_m(p_W, frames[c].X_WC.R_RT * ray);
           image[c].push_back(depth < static_cast<double>(range_m) ? static_cast<float>(depth)
                                                                   : std::numeric_limits<float>::infinity());
         }
       }
-      frames[c].frame.width = frames[c].frame.height = static_cast<std::uint16_t>(pixels);
+      frames[c].frame.width = static_cast<std::uint16_t>(pixels);
+      frames[c].frame.height = static_cast<std::uint16_t>(rows);
       frames[c].frame.tan_half_fov_ratio = 1.0F;
       frames[c].frame.range_m = range_m;
       frames[c].frame.depth_m = image[c];
