@@ -26,6 +26,7 @@ constexpr float kNear_m = 1e-3F;  // a block that reaches behind the camera is p
 
 constexpr double kCore = 0.5;  // of a finest cell, the part that has to be seen past
 
+/// Eight positions.
 struct Lanes {
   alignas(32) float x[8];
   alignas(32) float y[8];
@@ -35,44 +36,80 @@ struct Lanes {
 /// One bit a block.
 template <class Bits>
 struct Marks {
-  Bits free{0}, mixed{0}, blocked{0}, outside{0}, covered{0};
+  Bits free{0}, mixed{0}, blocked{0}, covered{0};
+};
+
+template <class Bits>
+struct Decision {
+  Bits free, mixed;
 };
 
 /// Seen as free by one camera and as hidden by another that sees all of it: they disagree, and always will.
-template <class Bits, class Result>
-HWY_INLINE void decide(const Marks<Bits>& marks, bool complete, Result& result) {
+template <class Bits>
+HWY_INLINE Decision<Bits> decide(const Marks<Bits>& marks, bool complete) {
   const Bits covered = complete ? ~Bits{0} : marks.covered;
-  result.free = marks.free & ~marks.mixed & ~marks.blocked & covered;
-  result.mixed = (marks.mixed | (marks.free & ~covered)) & ~marks.blocked;
+  return {marks.free & ~marks.mixed & ~marks.blocked & covered,
+          (marks.mixed | (marks.free & ~covered)) & ~marks.blocked};
 }
 
-struct Rectangles {
-  alignas(32) std::int32_t u0[8];
-  alignas(32) std::int32_t u1[8];
-  alignas(32) std::int32_t v0[8];
-  alignas(32) std::int32_t v1[8];
-  alignas(32) std::int32_t needed[8];
-  alignas(32) std::int32_t nearest[8];
-  alignas(32) std::int32_t corner[4][8];
-  alignas(32) std::int32_t entry[8];
+/// A camera's look at eight blocks: where in its pyramid, and which depths decide.
+struct Look {
+  const DepthPyramid::Entry* entry;
+  alignas(32) std::int32_t above[8];  ///< First entry of the upper row of a block's rectangle,
+  alignas(32) std::int32_t below[8];  ///< and of the lower one.
+  alignas(32) std::int32_t more[8];   ///< Entries of a row after the first; at most 2.
+  alignas(32) float needed[8];        ///< In steps: what has to be seen past, and
+  alignas(32) float nearest[8];       ///< what has to be seen for any of it to be free.
+  unsigned outside, straddling, inside;
 };
 
-/// The minimum of four entries. Single loads: gather instructions are slow where they are patched against
-/// leaks.
-HWY_INLINE void store_least(const DepthPyramid::Entry* entry, std::int32_t a, std::int32_t b, std::int32_t c,
-                            std::int32_t e, std::int32_t* to) {
+/// Of a vector of rectangles, the least of the entries [first, first + more] of both rows; more is at most 2.
+/// Whole loads of four entries: gather instructions are slow where they are patched against leaks.
+template <class V>
+HWY_INLINE V least_entries(const DepthPyramid::Entry* entry, const std::int32_t* above,
+                           const std::int32_t* below, V more) {
+  const Ints di;
 #if HWY_TARGET == HWY_SCALAR
-  std::int16_t least = DepthPyramid::kMaxSteps, not_most = DepthPyramid::kMaxSteps;
-  for (const std::int32_t i : {a, b, c, e}) {
-    least = std::min(least, entry[i].least_steps);
-    not_most = std::min(not_most, entry[i].not_most_steps);
+  DepthPyramid::Entry least{DepthPyramid::kMaxSteps, DepthPyramid::kMaxSteps};
+  for (std::int32_t i = 0; i <= hn::GetLane(more); ++i) {
+    for (const DepthPyramid::Entry& e : {entry[*above + i], entry[*below + i]}) {
+      least.least_steps = std::min(least.least_steps, e.least_steps);
+      least.not_most_steps = std::min(least.not_most_steps, e.not_most_steps);
+    }
   }
-  *to = least | (static_cast<std::int32_t>(not_most) << 16U);
+  return hn::Set(di, least.least_steps | (static_cast<std::int32_t>(least.not_most_steps) << 16U));
 #else
-  const hn::CappedTag<std::int16_t, 2> pair;
-  const auto at = [&](std::int32_t i) { return hn::LoadU(pair, &entry[i].least_steps); };
-  hn::StoreU(hn::Min(hn::Min(at(a), at(b)), hn::Min(at(c), at(e))), pair,
-             reinterpret_cast<std::int16_t*>(to));
+  const hn::Repartition<std::int16_t, Ints> d16;
+  const hn::Repartition<std::int64_t, Ints> d64;
+  const auto four = [&](std::size_t i) {
+    const hn::CappedTag<std::int16_t, 8> eight;
+    return hn::Min(hn::LoadU(eight, &entry[above[i]].least_steps),
+                   hn::LoadU(eight, &entry[below[i]].least_steps));
+  };
+  // The entries of rectangle i, and of i + 4 in the upper half of a wider vector.
+  const auto row = [&](std::size_t i) {
+    if constexpr (hn::MaxLanes(Ints()) == 8) {
+      return hn::BitCast(di, hn::Combine(d16, four(i + 4), four(i)));
+    } else {
+      return hn::BitCast(di, four(i));
+    }
+  };
+  const auto a = row(0), b = row(1), c = row(2), e = row(3);
+  const auto low = [&](auto left, auto right) {
+    return hn::BitCast(d64, hn::InterleaveLower(di, left, right));
+  };
+  const auto high = [&](auto left, auto right) {
+    return hn::BitCast(d64, hn::InterleaveUpper(di, left, right));
+  };
+  const auto first = hn::BitCast(di, hn::InterleaveLower(d64, low(a, b), low(c, e)));
+  const auto second = hn::BitCast(di, hn::InterleaveUpper(d64, low(a, b), low(c, e)));
+  const auto third = hn::BitCast(di, hn::InterleaveLower(d64, high(a, b), high(c, e)));
+  const auto none = hn::Set(di, 0x7FFF7FFF);
+  const auto least = [&](V x, V y) {
+    return hn::BitCast(di, hn::Min(hn::BitCast(d16, x), hn::BitCast(d16, y)));
+  };
+  return least(first, least(hn::IfThenElse(hn::Gt(more, hn::Zero(di)), second, none),
+                            hn::IfThenElse(hn::Gt(more, hn::Set(di, 1)), third, none)));
 #endif
 }
 
@@ -88,11 +125,10 @@ HWY_INLINE unsigned bits_of(Mask mask) {
 template <class V>
 HWY_INLINE V half_width(const SightCamera& c, std::size_t row, V tangent, V half_over_near) {
   const Floats d;
-  V sum = hn::Zero(d);
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    sum = hn::Add(sum, hn::Abs(hn::Sub(hn::Set(d, c.R_CW[3 * row + axis]),
-                                       hn::Mul(tangent, hn::Set(d, c.R_CW[axis])))));
-  return hn::Mul(sum, half_over_near);
+  const auto of = [&](std::size_t axis) {
+    return hn::Abs(hn::Sub(hn::Set(d, c.R_CW[3 * row + axis]), hn::Mul(tangent, hn::Set(d, c.R_CW[axis]))));
+  };
+  return hn::Mul(hn::Add(hn::Add(of(0), of(1)), of(2)), half_over_near);
 }
 
 /// How deep the best corner of a cube is within the sides of the field of view; with -half_m the worst one.
@@ -114,26 +150,33 @@ HWY_INLINE auto out_of_view(const SightCamera& c, float half_m, V x, V y, V z) {
   return hn::Or(hn::Le(inside_view(c, half_m, x, y, z), hn::Zero(d)), hn::Le(far, hn::Set(d, kNear_m)));
 }
 
+/// The first and the last pixel of what is `half` wide to both sides of a tangent. Returns their difference.
 template <class V>
-HWY_INLINE void store_pixels(V low, V high, float scale, float last, V keep, std::int32_t* first,
-                             std::int32_t* end) {
-  const Floats d;
-  const V limit = hn::Set(d, last);
-  const auto pixel = [&](V tangent) {
-    return hn::ConvertTo(
-        Ints(), hn::And(keep, hn::Min(hn::Max(hn::Mul(tangent, hn::Set(d, scale)), hn::Zero(d)), limit)));
-  };
-  hn::Store(pixel(low), Ints(), first);
-  hn::Store(pixel(high), Ints(), end);
-}
-
-HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Marks<unsigned>& marks) {
+HWY_INLINE auto store_pixels(V tangent, V half, float tan_half, float pixels_per_tan, float last_pixel,
+                             std::int32_t* from, std::int32_t* to) {
   const Floats d;
   const Ints di;
-  Rectangles r;
+  const V middle = hn::Sub(hn::Set(d, tan_half), tangent);
+  const V scale = hn::Set(d, pixels_per_tan), last = hn::Set(d, last_pixel), zero = hn::Zero(d);
+  const auto first = hn::ConvertTo(di, hn::Min(hn::Max(hn::Mul(hn::Sub(middle, half), scale), zero), last));
+  const auto end = hn::ConvertTo(di, hn::Min(hn::Max(hn::Mul(hn::Add(middle, half), scale), zero), last));
+  hn::Store(first, di, from);
+  hn::Store(end, di, to);
+  return hn::Sub(end, first);
+}
+
+/// Where one camera has to look for eight cubes. kInside: it sees all of them, as their parent has shown.
+template <bool kInside>
+HWY_INLINE void aim(const SightCamera& c, float half_m, const Lanes& at, Look& look) {
+  const Floats d;
+  const Ints di;
+  alignas(32) std::int32_t u0[8];
+  alignas(32) std::int32_t u1[8];
+  alignas(32) std::int32_t v0[8];
+  alignas(32) std::int32_t v1[8];
   const auto set = [&](float value) { return hn::Set(d, value); };
-  unsigned outside = 0, inside = 0, straddling = 0;
-  auto longest = hn::Set(di, 0);
+  unsigned outside = 0, straddling = 0, inside = kInside ? 0xFFU : 0U;
+  auto longest = hn::Zero(di);
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     const auto x = hn::Load(d, at.x + i);
     const auto y = hn::Load(d, at.y + i);
@@ -141,50 +184,44 @@ HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Ma
     const auto reach = set(half_m * c.extent);
     const auto far = hn::Add(x, reach);
     const auto near = hn::Sub(x, reach);
-    const auto zero = hn::Zero(d);
-    const auto is_outside = out_of_view(c, half_m, x, y, z);
-    const auto is_straddling = hn::Le(near, set(kNear_m));
-    outside |= bits_of(is_outside) << i;
-    straddling |= bits_of(is_straddling) << i;
-    inside |= bits_of(hn::Ge(inside_view(c, -half_m, x, y, z), zero)) << i;
-    const auto skip = hn::Or(is_outside, is_straddling);
-    const auto keep = hn::IfThenZeroElse(skip, hn::BitCast(d, hn::Set(di, -1)));
-    const auto depth = hn::IfThenElse(skip, set(1.0F), x);
+    auto depth = x, nearest = near, half = set(half_m);
+    if constexpr (!kInside) {
+      const auto is_outside = out_of_view(c, half_m, x, y, z);
+      const auto is_straddling = hn::Le(near, set(kNear_m));
+      outside |= bits_of(is_outside) << i;
+      straddling |= bits_of(is_straddling) << i;
+      inside |= bits_of(hn::Ge(inside_view(c, -half_m, x, y, z), hn::Zero(d))) << i;
+      // These are not looked at: anything will do that leads to a pixel of the image.
+      const auto skip = hn::Or(is_outside, is_straddling);
+      depth = hn::IfThenElse(skip, set(1.0F), x);
+      nearest = hn::IfThenElse(skip, set(1.0F), near);
+      half = hn::IfThenZeroElse(skip, half);
+    }
     const auto inverse = hn::Div(set(1.0F), depth);
-    const auto half_over_near = hn::Div(set(half_m), hn::IfThenElse(skip, set(1.0F), near));
+    const auto half_over_near = hn::Div(half, nearest);
     const auto u = hn::Mul(y, inverse);
     const auto v = hn::Mul(z, inverse);
-    const auto du = half_width(c, 1, u, half_over_near);
-    const auto dv = half_width(c, 2, v, half_over_near);
-    const auto u_middle = hn::Sub(set(c.tan_half), u);
-    const auto v_middle = hn::Sub(set(c.tan_half), v);
-    store_pixels(hn::Sub(u_middle, du), hn::Add(u_middle, du), c.columns_per_tan, c.last_column, keep,
-                 r.u0 + i, r.u1 + i);
-    store_pixels(hn::Sub(v_middle, dv), hn::Add(v_middle, dv), c.rows_per_tan, c.last_row, keep, r.v0 + i,
-                 r.v1 + i);
-    const auto span = [&](const std::int32_t* first, const std::int32_t* last) {
-      return hn::Sub(hn::Load(di, last + i), hn::Load(di, first + i));
-    };
-    longest = hn::Max(longest, hn::Max(span(r.u0, r.u1), span(r.v0, r.v1)));
+    const auto columns = store_pixels(u, half_width(c, 1, u, half_over_near), c.tan_half, c.columns_per_tan,
+                                      c.last_column, u0 + i, u1 + i);
+    const auto rows = store_pixels(v, half_width(c, 2, v, half_over_near), c.tan_half, c.rows_per_tan,
+                                   c.last_row, v0 + i, v1 + i);
+    longest = hn::Max(longest, hn::Max(columns, rows));
     // What the camera calls empty up to its range is believed up to the range itself: no margin there.
     const auto margin = hn::Add(set(c.margin_m), hn::Mul(set(c.margin_per_m2), hn::Mul(far, far)));
     const auto needed = hn::Min(hn::Add(far, margin), hn::Max(far, set(c.range_m)));
     const auto steps = set(c.pyramid->steps_per_m());
-    const auto most_steps = set(2.0F * static_cast<float>(DepthPyramid::kMaxSteps));
-    hn::Store(hn::Add(hn::ConvertTo(di, hn::Min(hn::Mul(needed, steps), most_steps)), hn::Set(di, 1)), di,
-              r.needed + i);
-    hn::Store(hn::ConvertTo(di, hn::Min(hn::Max(hn::Mul(near, steps), zero), most_steps)), di, r.nearest + i);
+    hn::Store(hn::Mul(needed, steps), d, look.needed + i);
+    hn::Store(hn::Mul(near, steps), d, look.nearest + i);
   }
-  const unsigned looked = ~(outside | straddling) & 0xFFU;
-  marks.outside = outside;
-  marks.mixed |= straddling & ~outside;
-  if (looked == 0) return;
+  look.outside = outside;
+  look.straddling = straddling & ~outside;
+  look.inside = inside & ~(outside | straddling);
 
   // One level for all eight blocks, so that the result does not depend on how many are done at once.
   const std::int32_t side = hn::GetLane(hn::MaxOfLanes(di, longest)) + 1;
   const DepthPyramid::Level& level =
       c.pyramid->level(std::max(DepthPyramid::level_for(side), c.pyramid->first_level()));
-  unsigned sees_past = 0, hidden = 0;
+  look.entry = level.entry;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     const auto first = [&](const std::int32_t* from) {
       return hn::ShiftRightSame(hn::Load(di, from + i), level.shift);
@@ -193,75 +230,44 @@ HWY_INLINE void see_with(const SightCamera& c, float half_m, const Lanes& at, Ma
       const auto past = hn::Add(hn::Load(di, to + i), hn::Set(di, 1 << level.shift));
       return hn::Sub(hn::ShiftRightSame(past, level.shift), hn::Set(di, level.back));
     };
-    const auto x0 = first(r.u0), x1 = hn::Max(last(r.u1), x0);
+    const auto column = first(u0), row = first(v0);
     const auto width = hn::Set(di, level.width);
-    const auto row0 = first(r.v0), row1 = hn::Max(last(r.v1), row0);
-    const auto y0 = hn::Mul(row0, width), y1 = hn::Mul(row1, width);
-    hn::Store(hn::Add(x0, y0), di, r.corner[0] + i);
-    hn::Store(hn::Add(x1, y0), di, r.corner[1] + i);
-    hn::Store(hn::Add(x0, y1), di, r.corner[2] + i);
-    hn::Store(hn::Add(x1, y1), di, r.corner[3] + i);
+    hn::Store(hn::Add(hn::Mul(row, width), column), di, look.above + i);
+    hn::Store(hn::Add(hn::Mul(hn::Max(last(v1), row), width), column), di, look.below + i);
+    hn::Store(hn::Max(hn::Sub(last(u1), column), hn::Zero(di)), di, look.more + i);
   }
-  for (std::size_t i = 0; i < 8; ++i)
-    store_least(level.entry, r.corner[0][i], r.corner[1][i], r.corner[2][i], r.corner[3][i], r.entry + i);
+}
+
+HWY_INLINE void look_through(const Look& look, Marks<unsigned>& marks) {
+  const Floats d;
+  const Ints di;
+  unsigned sees_past = 0, hidden = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    const auto entry = hn::Load(di, r.entry + i);
+    const auto entry = least_entries(look.entry, look.above + i, look.below + i, hn::Load(di, look.more + i));
     const auto least = hn::And(entry, hn::Set(di, 0xFFFF));
     const auto most = hn::Sub(hn::Set(di, DepthPyramid::kMaxSteps), hn::ShiftRight<16>(entry));
-    const auto bits = [&](auto mask) { return bits_of(hn::RebindMask(d, mask)) << i; };
-    sees_past |= bits(hn::Gt(least, hn::Sub(hn::Load(di, r.needed + i), hn::Set(di, 1))));
-    hidden |= bits(hn::Gt(hn::Add(hn::Load(di, r.nearest + i), hn::Set(di, 1)), most));
+    sees_past |= bits_of(hn::Gt(hn::ConvertTo(d, least), hn::Load(d, look.needed + i))) << i;
+    hidden |= bits_of(hn::Ge(hn::Load(d, look.nearest + i), hn::ConvertTo(d, most))) << i;
   }
+  const unsigned looked = ~(look.outside | look.straddling) & 0xFFU;
   sees_past &= looked;
   hidden &= looked & ~sees_past;
   marks.free |= sees_past;
-  marks.covered |= sees_past & inside;
-  marks.blocked |= hidden & inside;
-  marks.mixed |= looked & ~sees_past & ~hidden;
+  marks.covered |= sees_past & look.inside;
+  marks.blocked |= hidden & look.inside;
+  marks.mixed |= look.straddling | (looked & ~sees_past & ~hidden);
 }
-
-struct Combined {
-  unsigned free, mixed;
-  std::array<unsigned, kMaxCameras> outside;
-};
 
 HWY_INLINE float half_edge_m(int level) {
   return static_cast<float>((level == 0 ? kCore : 1.0) * 0.5 * cell_size_m(level));
 }
 
-/// Eight blocks, with their positions in the frame of each camera of the set.
-HWY_INLINE void combine(const SightCameras& cameras, unsigned set, int level, const Lanes* at,
-                        Combined& result) {
-  const float half_m = half_edge_m(level);
-  Marks<unsigned> marks;
-  for (unsigned rest = set; rest != 0; rest &= rest - 1) {
-    const auto k = static_cast<std::size_t>(__builtin_ctz(rest));
-    see_with(cameras.camera[k], half_m, at[k], marks);
-    result.outside[k] = marks.outside;
-  }
-  decide(marks, cameras.complete, result);
-}
-
-/// The cameras of the set that can see some of block i.
-HWY_INLINE std::uint8_t cameras_of(const Combined& combined, unsigned set, unsigned i) {
-  unsigned can_see = 0;
-  for (unsigned rest = set; rest != 0; rest &= rest - 1) {
-    const auto k = static_cast<unsigned>(__builtin_ctz(rest));
-    can_see |= (~(combined.outside[k] >> i) & 1U) << k;
-  }
-  return static_cast<std::uint8_t>(can_see);
-}
-
-HWY_INLINE EightSeen summary(const Combined& combined, unsigned set) {
-  EightSeen seen{static_cast<std::uint8_t>(combined.free), static_cast<std::uint8_t>(combined.mixed), {}};
-  for (unsigned i = 0; i < 8; ++i) seen.cameras[i] = cameras_of(combined, set, i);
-  return seen;
-}
-
+/// Part of a brick.
 struct Node {
   std::uint16_t morton;
   std::uint8_t level;
-  std::uint8_t cameras;
+  std::uint8_t cameras;  ///< That can see some of it, and of these those that
+  std::uint8_t inside;   ///< see all of it.
   std::array<std::array<float, 3>, kMaxCameras> p_C;
 };
 
@@ -276,20 +282,43 @@ HWY_INLINE std::array<float, 3> in_camera(const SightCamera& c, const Vector3& p
   return p_C;
 }
 
-/// The children of a node, in the frame of each camera.
-HWY_INLINE void place_children(const SightCameras& cameras, const Node& node, Lanes* at) {
+/// A camera's look at the children of a node.
+struct Sight {
+  Lanes at;  ///< In the frame of the camera.
+  Look look;
+  unsigned camera;
+};
+
+HWY_INLINE void place_children(const SightCamera& c, const std::array<float, 3>& p_C, int level, Lanes& at) {
   const Floats d;
-  const auto quarter = hn::Set(d, static_cast<float>(0.25 * cell_size_m(node.level)));
+  const auto quarter = hn::Set(d, static_cast<float>(0.25 * cell_size_m(level)));
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    const auto place = [&](std::size_t row) {
+      return hn::Add(hn::Set(d, p_C[row]), hn::Mul(quarter, hn::Load(d, c.child[row].data() + i)));
+    };
+    hn::Store(place(0), d, at.x + i);
+    hn::Store(place(1), d, at.y + i);
+    hn::Store(place(2), d, at.z + i);
+  }
+}
+
+/// From the cameras of a node to its children, in `sight`. Returns how many.
+HWY_INLINE std::size_t aim_at_children(const SightCameras& cameras, const Node& node, float half_m,
+                                       Sight* sight) {
+  std::size_t count = 0;
   for (unsigned set = node.cameras; set != 0; set &= set - 1) {
     const auto k = static_cast<std::size_t>(__builtin_ctz(set));
-    float* const lane[3] = {at[k].x, at[k].y, at[k].z};
-    for (std::size_t row = 0; row < 3; ++row) {
-      const float* const offset = cameras.camera[k].child[row].data();
-      const auto center = hn::Set(d, node.p_C[k][row]);
-      for (std::size_t i = 0; i < 8; i += hn::Lanes(d))
-        hn::Store(hn::Add(center, hn::Mul(quarter, hn::Load(d, offset + i))), d, lane[row] + i);
+    const SightCamera& c = cameras.camera[k];
+    Sight& s = sight[count++];
+    s.camera = static_cast<unsigned>(k);
+    place_children(c, node.p_C[k], node.level, s.at);
+    if (((unsigned{node.inside} >> k) & 1U) != 0) {
+      aim<true>(c, half_m, s.at, s.look);
+    } else {
+      aim<false>(c, half_m, s.at, s.look);
     }
   }
+  return count;
 }
 
 HWY_INLINE Node node_of(const SightCameras& cameras, const SightBlock& block) {
@@ -356,8 +385,10 @@ void see_blocks_lanes(const SightCameras& cameras, int level, std::span<const Ve
         eight.z[i] = at[block / 8].z[block % 8];
         seen.cameras[block] = static_cast<std::uint8_t>(seen.cameras[block] | 1U << k);
       }
+      Look look;
+      aim<false>(c, half_m, eight, look);
       Marks<unsigned> here;
-      see_with(c, half_m, eight, here);
+      look_through(look, here);
       const auto spread = [&](unsigned bits, std::uint64_t& to) {
         for (; bits != 0; bits &= bits - 1)
           to |= std::uint64_t{1} << in_view[first + static_cast<std::size_t>(__builtin_ctz(bits))];
@@ -368,50 +399,81 @@ void see_blocks_lanes(const SightCameras& cameras, int level, std::span<const Ve
       spread(here.covered, marks.covered);
     }
   }
-  decide(marks, cameras.complete, seen);
+  const Decision<std::uint64_t> decision = decide(marks, cameras.complete);
+  seen.free = decision.free;
+  seen.mixed = decision.mixed;
 }
 
 EightSeen see_children_lanes(const SightCameras& cameras, const SightBlock& parent) {
-  Lanes at[kMaxCameras];
   const Node node = node_of(cameras, parent);
-  place_children(cameras, node, at);
-  Combined combined;
-  combine(cameras, node.cameras, node.level - 1, at, combined);
-  return summary(combined, node.cameras);
+  std::array<Sight, kMaxCameras> sight;
+  const std::size_t count = aim_at_children(cameras, node, half_edge_m(node.level - 1), sight.data());
+  Marks<unsigned> marks;
+  EightSeen seen{};
+  for (std::size_t j = 0; j < count; ++j) {
+    look_through(sight[j].look, marks);
+    for (unsigned i = 0; i < 8; ++i)
+      seen.cameras[i] = static_cast<std::uint8_t>(seen.cameras[i] | (~(sight[j].look.outside >> i) & 1U)
+                                                                        << sight[j].camera);
+  }
+  const Decision<unsigned> decision = decide(marks, cameras.complete);
+  seen.free = static_cast<std::uint8_t>(decision.free);
+  seen.mixed = static_cast<std::uint8_t>(decision.mixed);
+  return seen;
 }
 
 void see_brick_lanes(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) {
-  // Depth first: at most seven siblings wait on each of four levels.
-  std::array<Node, 29> stack;
-  Lanes at[kMaxCameras];
+  // Depth first, but up to eight nodes of a level together, step by step: what one waits for the next can
+  // use.
+  constexpr std::size_t kTogether = 8;
+  // Nodes of level 3, all looked at together, have 64 children of level 2; eight of these have 64 of level 1.
+  std::array<Node, 64 - kTogether + 64> stack;
+  std::array<Sight, kTogether * kMaxCameras> sight;
   stack[0] = node_of(cameras, brick);
   std::size_t depth = 1;
   seen.count = 0;
   seen.visited = 0;
   seen.free_cells = 0;
-  Combined combined;
-  while (depth > 0 && seen.visited < BrickSeen::kMaxGroups) {
-    const Node node = stack[--depth];
-    ++seen.visited;
-    place_children(cameras, node, at);
-    const int level = node.level - 1;
-    combine(cameras, node.cameras, level, at, combined);
-    if (combined.free != 0) {
-      seen.group[seen.count++] = {node.morton, static_cast<std::uint8_t>(level),
-                                  static_cast<std::uint8_t>(combined.free)};
-      seen.free_cells += static_cast<std::uint32_t>(__builtin_popcount(combined.free))
-                         << (3U * static_cast<unsigned>(level));
+  while (depth > 0) {
+    const int level = stack[depth - 1].level - 1;
+    const float half_m = half_edge_m(level);
+    std::array<unsigned, kTogether> morton;
+    std::array<std::size_t, kTogether + 1> first{};  // of a node's sights
+    std::size_t nodes = 0;
+    while (depth > 0 && nodes < kTogether && stack[depth - 1].level == level + 1) {
+      const Node& node = stack[--depth];
+      morton[nodes] = node.morton;
+      first[nodes + 1] = first[nodes] + aim_at_children(cameras, node, half_m, &sight[first[nodes]]);
+      ++nodes;
     }
-    if (level <= finest) continue;
-    for (unsigned mixed = combined.mixed; mixed != 0; mixed &= mixed - 1) {
-      const auto i = static_cast<unsigned>(__builtin_ctz(mixed));
-      Node& child = stack[depth++];
-      child.morton = static_cast<std::uint16_t>(8U * node.morton + i);
-      child.level = static_cast<std::uint8_t>(level);
-      child.cameras = cameras_of(combined, node.cameras, i);
-      for (unsigned rest = child.cameras; rest != 0; rest &= rest - 1) {
-        const auto k = static_cast<std::size_t>(__builtin_ctz(rest));
-        child.p_C[k] = {at[k].x[i], at[k].y[i], at[k].z[i]};
+    seen.visited += static_cast<std::uint32_t>(nodes);
+    for (std::size_t n = 0; n < nodes; ++n) {
+      Marks<unsigned> marks;
+      for (std::size_t j = first[n]; j < first[n + 1]; ++j) look_through(sight[j].look, marks);
+      const Decision<unsigned> decision = decide(marks, cameras.complete);
+      seen.group[seen.count] = {static_cast<std::uint16_t>(morton[n]), static_cast<std::uint8_t>(level),
+                                static_cast<std::uint8_t>(decision.free)};
+      seen.count += decision.free != 0 ? 1U : 0U;
+      seen.free_cells += static_cast<std::uint32_t>(__builtin_popcount(decision.free))
+                         << (3U * static_cast<unsigned>(level));
+      if (level <= finest) continue;
+      for (unsigned mixed = decision.mixed; mixed != 0; mixed &= mixed - 1) {
+        const auto i = static_cast<unsigned>(__builtin_ctz(mixed));
+        Node& child = stack[depth++];
+        child.morton = static_cast<std::uint16_t>(8U * morton[n] + i);
+        child.level = static_cast<std::uint8_t>(level);
+        unsigned can_see = 0, inside = 0;
+        for (std::size_t j = first[n]; j < first[n + 1]; ++j) {
+          const Sight& s = sight[j];
+          can_see |= (~(s.look.outside >> i) & 1U) << s.camera;
+          inside |= ((s.look.inside >> i) & 1U) << s.camera;
+          std::array<float, 3>& p_C = child.p_C[s.camera];
+          p_C[0] = s.at.x[i];
+          p_C[1] = s.at.y[i];
+          p_C[2] = s.at.z[i];
+        }
+        child.cameras = static_cast<std::uint8_t>(can_see);
+        child.inside = static_cast<std::uint8_t>(inside);
       }
     }
   }

@@ -40,7 +40,8 @@ float bridged_m(const firmware_if::DepthFrame& frame, std::size_t x, std::size_t
 }
 
 std::size_t entry_count(std::size_t max_side) noexcept {
-  std::size_t total = 2 * max_side * max_side + DepthPyramid::kMaxLevels;
+  constexpr std::size_t kPad = 3;  // entries are read four at a time
+  std::size_t total = 2 * max_side * max_side + DepthPyramid::kMaxLevels + kPad;
   for (std::size_t side = max_side; side > 1;) {
     side = (side + 1) / 2;
     total += side * side;

@@ -60,8 +60,7 @@ class DepthPyramid {
   [[nodiscard]] Status build(const firmware_if::DepthFrame& frame, int tile_shift = 0) noexcept;
   /// The level for rectangles of up to this many pixels a side: the least k with side <= 2^k + 2. O(1).
   [[nodiscard]] static constexpr int level_for(std::int32_t side) noexcept {
-    if (side <= 4) return side <= 2 ? 0 : 1;
-    return 32 - __builtin_clz(static_cast<unsigned>(side - 3));
+    return (side > 2 ? 32 : 31) - __builtin_clz(static_cast<unsigned>(side > 3 ? side - 3 : 1));
   }
   [[nodiscard]] const Level& level(int k) const noexcept { return level_[static_cast<std::size_t>(k)]; }
   /// The finest level that there is: 0, or tile_shift + 1.
