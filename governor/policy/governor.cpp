@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace roborun::governor {
 namespace {
@@ -186,7 +187,11 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   const double all_s = needed_s(coarsest, 1.0);
   const double share = all_s > deadline_s ? std::max(deadline_s - none_s, 0.0) / (all_s - none_s) : 1.0;
 
-  // 3. The operating point.
+  // 3. The operating point. In the open there is nothing to search for.
+  const bool open = situation.straight && !situation.motion &&
+                    profile.obstacle_ahead_m == std::numeric_limits<double>::infinity();
+  const double share_m3 = policy.planner_share * see_m3;
+  const double plan_m3 = open ? std::min(policy.open_planner_m3, share_m3) : share_m3;
   SolverProblem& p = d.problem;
   p.delta_d_s = deadline_s * (1.0 - policy.reserve_ratio) - overhead;
   p.model = config_.model;
@@ -202,7 +207,7 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   p.v_map_m3 = profile.map_volume_m3 > 0.0 ? profile.map_volume_m3 : 0.0;
   p.v0_max_m3 = std::min(kAwareV0_m3, share * see_m3);
   p.v1_max_m3 = kAwareV1_m3;
-  p.v2_max_m3 = policy.planner_share * see_m3;
+  p.v2_max_m3 = plan_m3;
   d.solution = solve(p);
   fill_prediction(d);
   last_level_ = d.solution.p0_level;
@@ -211,7 +216,7 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   if (d.solution.status != Status::kOk) {
     d.solution.v0_m3 = see_m3;
     d.solution.v1_m3 = d.solution.v0_m3;
-    d.solution.v2_m3 = policy.planner_share * d.solution.v0_m3;
+    d.solution.v2_m3 = plan_m3;
     fill_prediction(d);
     double total_s = 0.0;
     for (const double stage_s : d.predicted_s) total_s += stage_s;

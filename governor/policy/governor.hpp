@@ -39,8 +39,11 @@ struct Policy {
   Nanos longest_budget{15'000'000'000};  ///< The authors' cap: what a standing vehicle is given.
   int failures_until_finer{2};           ///< From this many failed decisions on, one level finer for each.
   int coarser_levels_per_decision{1};    ///< Precision is lost slowly and won at once.
-  double cells_to_obstacle{2.0};    ///< At least so many cells between the vehicle and the nearest obstacle.
-  double planner_share{0.4};        ///< Of the perceived space, what a plan through it explores at most.
+  double cells_to_obstacle{2.0};  ///< At least so many cells between the vehicle and the nearest obstacle.
+  double planner_share{0.4};      ///< Of the perceived space, what a plan through it explores at most.
+  /// The same in the open: two of the planner's cells of 4.8 m, the ends of the straight way. Its share of
+  /// the time is kept, for what may come in view.
+  double open_planner_m3{220.0};
   double near_goal_m{8.0};          ///< Nearer than this: at most 0.6 m cells ...
   double near_goal_speed_mps{2.5};  ///< ... and this speed.
   /// While something moves nearby: no longer thinking than precision asks for, and this speed. At 2.5 m/s,
@@ -71,6 +74,7 @@ struct Situation {
   double distance_to_goal_m{};
   bool surveying{};  ///< The flight goes on to its hover whatever comes of this decision.
   bool motion{};     ///< Something moves nearby.
+  bool straight{};   ///< The plan before goes straight on, for most of what can be seen.
 };
 
 /// What was decided, and why.

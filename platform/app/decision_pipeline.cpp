@@ -19,6 +19,7 @@ constexpr double kMotionReach_m = 15.0;  // farther away depth noise looks like 
 constexpr int kMotionPoints = 3;
 constexpr double kStanding_mps = 0.5;
 constexpr double kTooFast = 1.5;
+constexpr double kMost = 2.0 / 3.0;  // of the horizon
 constexpr Nanos kMotionMemory{3'000'000'000};
 constexpr Nanos kTraceMemory{10'000'000'000};  // as long as the map may remember what has gone
 constexpr double kTraceSpacing_m = 0.6;
@@ -107,8 +108,9 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
 }
 
 void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noexcept {
-  out.decision =
-      governor_.decide(out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing, out.motion});
+  const bool straight = kept_W_.size() == 2 && (kept_W_[1] - kept_W_[0]).norm() >= kMost * config_.horizon_m;
+  out.decision = governor_.decide(
+      out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing, out.motion, straight});
   if (out.decision.predicted_s[index(core::StageId::kGovernor)] > 0.0)
     charge(core::StageId::kGovernor, {}, out);
 }
