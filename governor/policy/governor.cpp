@@ -188,10 +188,10 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   const double share = all_s > deadline_s ? std::max(deadline_s - none_s, 0.0) / (all_s - none_s) : 1.0;
 
   // 3. The operating point. In the open there is nothing to search for.
-  const bool open = situation.straight && !situation.motion &&
-                    profile.obstacle_ahead_m == std::numeric_limits<double>::infinity();
+  d.open = situation.straight && situation.failures == 0 && !situation.motion &&
+           profile.obstacle_ahead_m == std::numeric_limits<double>::infinity();
   const double share_m3 = policy.planner_share * see_m3;
-  const double plan_m3 = open ? std::min(policy.open_planner_m3, share_m3) : share_m3;
+  const double plan_m3 = d.open ? std::min(policy.open_planner_m3, share_m3) : share_m3;
   SolverProblem& p = d.problem;
   p.delta_d_s = deadline_s * (1.0 - policy.reserve_ratio) - overhead;
   p.model = config_.model;

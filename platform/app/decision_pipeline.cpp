@@ -19,7 +19,8 @@ constexpr double kMotionReach_m = 15.0;  // farther away depth noise looks like 
 constexpr int kMotionPoints = 3;
 constexpr double kStanding_mps = 0.5;
 constexpr double kTooFast = 1.5;
-constexpr double kMost = 2.0 / 3.0;  // of the horizon
+constexpr double kMost = 2.0 / 3.0;        // of the horizon
+constexpr double kCollinear = 1.0 - 1e-6;  // cosine
 constexpr Nanos kMotionMemory{3'000'000'000};
 constexpr Nanos kTraceMemory{10'000'000'000};  // as long as the map may remember what has gone
 constexpr double kTraceSpacing_m = 0.6;
@@ -93,7 +94,9 @@ void DecisionPipeline::sense_motion(const DecisionInput& in, const Aabb& relevan
 void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) noexcept {
   core::MeteredBudget budget = table_budget_of(core::StageId::kPointCloud);
   core::Work work;
-  (void)cloud_.step(in.frames, 0, budget, work);
+  const std::uint64_t refused = cloud_.counters().frames_refused;
+  const bool sees_all = cloud_.step(in.frames, 0, budget, work) == Status::kOk &&
+                        cloud_.counters().frames_refused == refused && in.frames.size() >= config_.cameras;
   const double r_m = radius_m();
   const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m),
                         config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
@@ -101,16 +104,23 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   out.motion = in.now < motion_until_;
   (void)profile_space({}, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W,
                       relevant_W, r_m, out.profile, budget, work);
+  if (!sees_all) out.profile.obstacle_ahead_m = 0.0;
   out.profile.sensor_volume_m3 = cloud_.seen_volume_m3();
   // What the map will hold once this decision's images are in it.
   out.profile.map_volume_m3 = map_.known_volume_m3() + cloud_.seen_volume_m3();
   charge(core::StageId::kPointCloud, work, out);
 }
 
+bool DecisionPipeline::went_straight(const DecisionInput& in) const noexcept {
+  if (kept_W_.size() != 2) return false;
+  const Vector3 way = kept_W_[1] - kept_W_[0], to_goal = in.goal_W - kept_W_[0];
+  return way.norm() >= kMost * config_.horizon_m &&
+         way.dot(to_goal) >= kCollinear * way.norm() * to_goal.norm();
+}
+
 void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noexcept {
-  const bool straight = kept_W_.size() == 2 && (kept_W_[1] - kept_W_[0]).norm() >= kMost * config_.horizon_m;
   out.decision = governor_.decide(
-      out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing, out.motion, straight});
+      out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing, out.motion, went_straight(in)});
   if (out.decision.predicted_s[index(core::StageId::kGovernor)] > 0.0)
     charge(core::StageId::kGovernor, {}, out);
 }
@@ -266,8 +276,12 @@ void DecisionPipeline::run(core::StageId id, const DecisionInput& in, DecisionOu
       return export_map(in, out);
     case core::StageId::kPlanner:
       plan(in, out);
-      for (std::size_t i = 0; i < core::kStageCount; ++i)
-        governor_.observe(static_cast<core::StageId>(i), out.decision.predicted_s[i], seconds(out.cost[i]));
+      for (std::size_t i = 0; i < core::kStageCount; ++i) {
+        const auto stage = static_cast<core::StageId>(i);
+        // The straight way alone is a few cells: too little to tell how fast the processor is.
+        if (stage == core::StageId::kPlanner && out.decision.open) continue;
+        governor_.observe(stage, out.decision.predicted_s[i], seconds(out.cost[i]));
+      }
       failures_ = out.smoother_status == Status::kOk || in.climbing ? 0 : failures_ + 1;
       return;
     case core::StageId::kSmoother:

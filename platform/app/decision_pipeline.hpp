@@ -25,6 +25,7 @@ struct PipelineConfig {
   double vehicle_radius_m{0.6};  ///< Half of the 1.2 m span. [0.1, 2]
   /// Added to the radius for planning: the tracking error (tests/platform/sitl/vehicle/closed_loop_test.cpp).
   double inflation_m{0.3};
+  std::size_t cameras{6};  ///< What fewer images do not show may be anything.
   double horizon_m{24.0};  ///< No way-point farther than this: one metre less than the cameras see.
   double acceleration_mps2{4.0};
   core::Fence fence{};                   ///< What it forbids is occupied for planner and smoother.
@@ -99,6 +100,8 @@ class DecisionPipeline {
   /// it: who is followed must not slow down.
   void sense_motion(const DecisionInput& in, const Aabb& relevant_W, core::StageBudget& budget,
                     core::Work& work) noexcept;
+  /// The plan before: straight towards the goal, for most of what can be seen.
+  [[nodiscard]] bool went_straight(const DecisionInput& in) const noexcept;
   void govern(const DecisionInput& in, DecisionOutput& out) noexcept;
   void integrate(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// What is flown, on the map that just got its images.

@@ -50,6 +50,7 @@ FlightSystem::FlightSystem(const sitl::World& world, const MissionConfig& config
   pipeline.flight_bounds_W = world.bounds_W();
   pipeline.map_bounds_W = {world.bounds_W().min_W - Vector3::Constant(kMapMargin_m),
                            world.bounds_W().max_W + Vector3::Constant(kMapMargin_m)};
+  pipeline.cameras = kCameras;
   pipeline.horizon_m = config.camera.range_m - 1.0;
   pipeline.fence = config.fence;
   pipeline.minor_frame = config.minor_frame;

@@ -139,7 +139,9 @@ TEST(Governor, SearchesLittleOnlyInTheOpen) {
   const double open_m3 = searched_m3(false, true);
   EXPECT_LE(open_m3, 220.0);
   EXPECT_GT(searched_m3(false, false), 10.0 * open_m3) << "the plan before had to turn, or ended soon";
-  EXPECT_GT(searched_m3(true, true), 0.0) << "there is time for it";
+  EXPECT_TRUE(sut.decide(p, {0, 100.0, false, false, true}).open);
+  EXPECT_FALSE(sut.decide(p, {1, 100.0, false, false, true}).open) << "the decision before failed";
+  EXPECT_FALSE(sut.decide(p, {0, 100.0, false, true, true}).open) << "something moves";
   const Nanos in_the_open = sut.decide(p, {0, 100.0, false, false, true}).point.deadline;
   for (const double ahead_m : {20.0, 0.0, kNan}) {
     p.obstacle_ahead_m = ahead_m;

@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <bitset>
+#include <memory>
+#include <optional>
+
 #include "core/random/counter_rng.hpp"
 #include "stages/perception/brick_map.hpp"
 #include "tests/stages/perception/scene.hpp"
@@ -158,6 +162,60 @@ TEST_F(BlockSight, ABlockIsFreeOnlyIfEveryRayThroughItSeesPastIt) {
   }
   EXPECT_GT(free_blocks, 200);
   EXPECT_GT(rays, 4000);
+}
+
+/// The free cells of a block by its children, one after the other, each against all edges of each view.
+void see_slowly(const SightCameras& cameras, const SightBlock& block, std::uint32_t morton,
+                std::bitset<kCellsPerBrick>& free) {
+  const EightSeen eight = see_children(cameras, block);
+  const double quarter = 0.25 * cell_size_m(block.level);
+  const std::uint32_t cells = std::uint32_t{1} << (3U * static_cast<unsigned>(block.level - 1));
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    const std::uint32_t child = 8 * morton + i;
+    if (((eight.free >> i) & 1U) != 0) {
+      for (std::uint32_t k = 0; k < cells; ++k) free.set(child * cells + k);
+    } else if (((eight.mixed >> i) & 1U) != 0 && block.level > 1) {
+      const Vector3 offset((i & 1U) != 0 ? quarter : -quarter, (i & 2U) != 0 ? quarter : -quarter,
+                           (i & 4U) != 0 ? quarter : -quarter);
+      see_slowly(cameras, {block.center_W + offset, block.level - 1, eight.cameras[i]}, child, free);
+    }
+  }
+}
+
+TEST_F(BlockSight, ABrickIsSeenAsItsBlocksOneByOne) {
+  std::vector<std::byte> block(6 * DepthPyramid::arena_bytes(45));
+  core::Arena arena(block);
+  std::array<std::optional<DepthPyramid>, 6> image;
+  SightCameras cameras;
+  for (cameras.count = 0; cameras.count < 6; ++cameras.count) {
+    const PosedDepthFrame& frame = frames_[cameras.count];
+    image[cameras.count].emplace(arena, 45);
+    ASSERT_EQ(image[cameras.count]->build(frame.frame), Status::kOk);
+    cameras.camera[cameras.count].prepare(frame, *image[cameras.count], {0.05, 0.0012});
+  }
+  core::CounterRng rng(6);
+  auto seen = std::make_unique<BrickSeen>();
+  std::size_t free_cells = 0, different = 0;
+  for (int n = 0; n < 400; ++n) {
+    cameras.complete = n % 2 == 0;
+    const Vector3 center_W(rng.uniform(-15, 15), rng.uniform(-15, 15), rng.uniform(0, 10));
+    const SightBlock brick{center_W, kBrickLevel, 0x3F};
+    see_brick(cameras, brick, 0, *seen);
+    std::bitset<kCellsPerBrick> free, slowly;
+    for (std::size_t g = 0; g < seen->count; ++g) {
+      const FreeGroup& group = seen->group[g];
+      const std::uint32_t cells = std::uint32_t{1} << (3U * unsigned{group.level});
+      for (std::uint32_t i = 0; i < 8; ++i)
+        for (std::uint32_t k = 0; ((unsigned{group.free} >> i) & 1U) != 0 && k < cells; ++k)
+          free.set((8U * group.parent + i) * cells + k);
+    }
+    EXPECT_EQ(free.count(), seen->free_cells);
+    see_slowly(cameras, brick, 0, slowly);
+    free_cells += free.count();
+    different += (free ^ slowly).count();
+  }
+  EXPECT_GT(free_cells, 300000U);
+  EXPECT_LT(different, free_cells / 10000) << "positions are rounded on the way down in one of them only";
 }
 
 TEST_F(BlockSight, TheCellsOfARowAreWhereItsPixelsEnd) {
