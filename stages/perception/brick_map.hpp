@@ -123,8 +123,9 @@ class BrickMap final : public OccupancyMap, private MapView {
   struct SurfaceCamera {
     const PosedDepthFrame* posed{};
     double column_pitch{}, row_pitch{};  ///< Of the pixels, at depth 1.
-    bool coarse{};  ///< p0 is a brick or more: surfaces in unknown bricks are noted, not written.
+    int level{};  ///< p0. A brick or more: surfaces in unknown bricks are noted, not written.
     PixelLine line{};
+    [[nodiscard]] bool is_coarse() const noexcept { return level >= kBrickLevel; }
   };
   /// Of column u and row v of the image, in edges, for a depth of 1.
   [[nodiscard]] static std::array<float, 3> direction(const SurfaceCamera& camera, double u, double v,
@@ -134,8 +135,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   void add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
                   core::Work& work) noexcept;
   /// Tile by tile: pixels are looked at where they may end in space of which something was known before.
-  void add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, int level,
-                 core::Work& work) noexcept;
+  void add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, core::Work& work) noexcept;
   /// True if nothing is known of all space in which this tile of tiles_ may end: then that is all to be done.
   [[nodiscard]] bool note_surface(std::size_t tile) noexcept;
   /// Whether something is known of what a brick and the cells [low, high] of a tile share. Not if this scan

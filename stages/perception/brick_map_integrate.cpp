@@ -303,7 +303,7 @@ void BrickMap::add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_
     if (position != last_position) {
       last_position = position;
       // Beyond the space that v0 paid for nothing is written: neither free nor occupied.
-      brick = paid(bx, by, bz) ? surface_brick(bx, by, bz, camera.coarse) : nullptr;
+      brick = paid(bx, by, bz) ? surface_brick(bx, by, bz, camera.is_coarse()) : nullptr;
     }
     if (brick == nullptr) continue;
     brick->add_hit(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)));
@@ -358,12 +358,11 @@ bool BrickMap::note_surface(std::size_t tile) noexcept {
   return true;
 }
 
-void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, int level,
-                         core::Work& work) noexcept {
+void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, core::Work& work) noexcept {
   const firmware_if::DepthFrame& frame = camera.posed->frame;
   const Matrix3& R = camera.posed->X_WC.R_RT;
   // Two tiles of the pyramid a side, four for blocks: every second entry of a level above them.
-  const DepthPyramid::Level& wide = image.level(image.tiles().shift + (level >= kBlockLevel ? 2 : 1));
+  const DepthPyramid::Level& wide = image.level(image.tiles().shift + (camera.level >= kBlockLevel ? 2 : 1));
   const std::size_t side = std::size_t{2} << static_cast<unsigned>(wide.shift);
   const std::size_t columns = (static_cast<std::size_t>(wide.width) + 1) / 2;
   const double across = camera.column_pitch * static_cast<double>(side);
@@ -400,7 +399,7 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work)
   for (std::size_t i = 0; i < cameras_.count; ++i) {
     SurfaceCamera camera;
     camera.posed = &request.frames[frame_of_[i]];
-    camera.coarse = request.level >= kBrickLevel;
+    camera.level = request.level;
     const firmware_if::DepthFrame& frame = camera.posed->frame;
     const double across = 2.0 * static_cast<double>(frame.tan_half_fov_ratio);
     camera.column_pitch = across / frame.width;
@@ -415,8 +414,8 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work)
       camera.line.step[k] =
           static_cast<float>(-camera.column_pitch / kFinestCell_m * camera.posed->X_WC.R_RT(axis, 1));
     }
-    if (camera.coarse) {
-      add_tiles(camera, *pyramid_[i], request.level, work);
+    if (camera.is_coarse()) {
+      add_tiles(camera, *pyramid_[i], work);
     } else {
       for (std::size_t v = 0; v < frame.height; ++v) add_pixels(camera, v, 0, frame.width, work);
     }
