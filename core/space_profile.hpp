@@ -20,7 +20,7 @@ struct SpaceProfile {
   double gap_min_m{};           ///< Smallest such gap that the vehicle fits through; +inf if none.
   double closest_obstacle_m{};  ///< Distance from the vehicle's centre to the nearest surface; +inf if none
                                 ///< in view.
-  double obstacle_ahead_m{};    ///< The same, only of surfaces within 45 degrees of the way to the goal.
+  double obstacle_ahead_m{};    ///< The same within 45 degrees of the way to the goal; 0 if not all was seen.
   double closest_unknown_m{};  ///< Visibility d: free distance ahead along the motion (or towards the goal at
                                ///< rest).
   double sensor_volume_m3{};   ///< Space that the depth images of this decision see.

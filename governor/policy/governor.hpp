@@ -41,8 +41,8 @@ struct Policy {
   int coarser_levels_per_decision{1};    ///< Precision is lost slowly and won at once.
   double cells_to_obstacle{2.0};  ///< At least so many cells between the vehicle and the nearest obstacle.
   double planner_share{0.4};      ///< Of the perceived space, what a plan through it explores at most.
-  /// The same in the open: two of the planner's cells of 4.8 m, the ends of the straight way. The
-  /// deadline stays that of a search.
+  /// The same in the open: not quite two of the planner's cells of 4.8 m, so that with the ends of the
+  /// straight way the search is over. The deadline stays that of a search.
   double open_planner_m3{220.0};
   double near_goal_m{8.0};          ///< Nearer than this: at most 0.6 m cells ...
   double near_goal_speed_mps{2.5};  ///< ... and this speed.
@@ -86,7 +86,7 @@ struct Decision {
   SolverSolution solution{};
   std::array<double, core::kStageCount> predicted_s{};
   double demand_m{};  ///< Coarsest cell that the space allows: min((g_avg - width) / 4, d_obs / 2).
-  bool open{};        ///< Nothing stands ahead: the plan is the straight way.
+  bool open{};        ///< Nothing stands ahead: the straight way, as far as it is free, is the plan.
 };
 
 /// One instance a vehicle. RT-safe: O(1), no allocation.

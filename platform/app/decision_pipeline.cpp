@@ -19,8 +19,8 @@ constexpr double kMotionReach_m = 15.0;  // farther away depth noise looks like 
 constexpr int kMotionPoints = 3;
 constexpr double kStanding_mps = 0.5;
 constexpr double kTooFast = 1.5;
-constexpr double kMost = 2.0 / 3.0;        // of the horizon
-constexpr double kCollinear = 1.0 - 1e-6;  // cosine
+constexpr double kStraightShare = 2.0 / 3.0;  // of the horizon
+constexpr double kCollinear = 1.0 - 1e-6;     // cosine
 constexpr Nanos kMotionMemory{3'000'000'000};
 constexpr Nanos kTraceMemory{10'000'000'000};  // as long as the map may remember what has gone
 constexpr double kTraceSpacing_m = 0.6;
@@ -114,7 +114,7 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
 bool DecisionPipeline::went_straight(const DecisionInput& in) const noexcept {
   if (kept_W_.size() != 2) return false;
   const Vector3 way = kept_W_[1] - kept_W_[0], to_goal = in.goal_W - kept_W_[0];
-  return way.norm() >= kMost * config_.horizon_m &&
+  return way.norm() >= kStraightShare * config_.horizon_m &&
          way.dot(to_goal) >= kCollinear * way.norm() * to_goal.norm();
 }
 

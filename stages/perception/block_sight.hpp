@@ -71,7 +71,8 @@ struct FreeGroup {
   std::uint8_t level;
   std::uint8_t free;
 };
-/// One group for each block of level 4 .. 1 that had to be divided.
+/// Room for a group of each block of level 4 .. 1; there are those of divided ones with a free child, in any
+/// order.
 struct BrickSeen {
   static constexpr std::size_t kMaxGroups = 1 + 8 + 64 + 512;
   std::array<FreeGroup, kMaxGroups> group;

@@ -58,7 +58,8 @@ class DepthPyramid {
   /// kCapacity if the image is larger than planned. `tile_shift` in [0, 3]: the finest bounds are those of
   /// tiles of 2^tile_shift pixels a side, for eyes that need no better. O(pixels).
   [[nodiscard]] Status build(const firmware_if::DepthFrame& frame, int tile_shift = 0) noexcept;
-  /// The level for rectangles of up to this many pixels a side: the least k with side <= 2^k + 2. O(1).
+  /// The level for rectangles of up to this many pixels a side: 0 up to two, else the least k >= 1 with
+  /// side <= 2^k + 2. O(1).
   [[nodiscard]] static constexpr int level_for(std::int32_t side) noexcept {
     return (side > 2 ? 32 : 31) - __builtin_clz(static_cast<unsigned>(side > 3 ? side - 3 : 1));
   }

@@ -25,12 +25,12 @@ struct SpaceProfilerConfig {
 /// kept. Neighbouring sectors whose ranges differ by less than 3 m show one obstacle; between all others
 /// there is a gap: the distance of their points, counted if the vehicle fits through and it is not wider than
 /// widest_gap_m. None: +infinity. Closest obstacle: nearest point within `relevant_W` (where the vehicle may
-/// be, grown by its radius), +infinity if none. Closest unknown: free distance in `view` ahead along v_WB, at
-/// rest towards goal_W; at most max_visible_m. Outlook: up to 32 samples of the trajectory from `now` to its
-/// end, each with the free distance along its motion there. `work.units` grows by the map cells visited. The
-/// budget is polled every 1,024 points and lookups; once it is spent (kBudgetSpent, otherwise kOk) what has
-/// not been looked at counts as near: distances 0, a gap as narrow as the vehicle. RT-safe: O(points +
-/// samples * range / cell).
+/// be, grown by its radius), +infinity if none; obstacle ahead: the same within 45 degrees of the way to
+/// goal_W. Closest unknown: free distance in `view` ahead along v_WB, at rest towards goal_W; at most
+/// max_visible_m. Outlook: up to 32 samples of the trajectory from `now` to its end, each with the free
+/// distance along its motion there. `work.units` grows by the map cells visited. The budget is polled every
+/// 1,024 points and lookups; once it is spent (kBudgetSpent, otherwise kOk) what has not been looked at
+/// counts as near: distances 0, a gap as narrow as the vehicle. RT-safe: O(points + samples * range / cell).
 [[nodiscard]] Status profile_space(const SpaceProfilerConfig& config, std::span<const CloudPoint> points,
                                    const MapView& view, const Trajectory& committed, MonotonicTime now,
                                    const Vector3& p_WB, const Vector3& v_WB, const Vector3& goal_W,
