@@ -303,8 +303,8 @@ HWY_INLINE void place_children(const SightCamera& c, const std::array<float, 3>&
 }
 
 /// From the cameras of a node to its children, in `sight`. Returns how many.
-HWY_INLINE std::size_t aim_at_children(const SightCameras& cameras, const Node& node, float half_m,
-                                       Sight* sight) {
+HWY_INLINE std::size_t aim_at_children(const SightCameras& cameras, const Node& node, Sight* sight) {
+  const float half_m = half_edge_m(node.level - 1);
   std::size_t count = 0;
   for (unsigned set = node.cameras; set != 0; set &= set - 1) {
     const auto k = static_cast<std::size_t>(__builtin_ctz(set));
@@ -407,7 +407,7 @@ void see_blocks_lanes(const SightCameras& cameras, int level, std::span<const Ve
 EightSeen see_children_lanes(const SightCameras& cameras, const SightBlock& parent) {
   const Node node = node_of(cameras, parent);
   std::array<Sight, kMaxCameras> sight;
-  const std::size_t count = aim_at_children(cameras, node, half_edge_m(node.level - 1), sight.data());
+  const std::size_t count = aim_at_children(cameras, node, sight.data());
   Marks<unsigned> marks;
   EightSeen seen{};
   for (std::size_t j = 0; j < count; ++j) {
@@ -436,14 +436,13 @@ void see_brick_lanes(const SightCameras& cameras, const SightBlock& brick, int f
   seen.free_cells = 0;
   while (depth > 0) {
     const int level = stack[depth - 1].level - 1;
-    const float half_m = half_edge_m(level);
     std::array<unsigned, kTogether> morton;
     std::array<std::size_t, kTogether + 1> first{};  // of a node's sights
     std::size_t nodes = 0;
     while (depth > 0 && nodes < kTogether && stack[depth - 1].level == level + 1) {
       const Node& node = stack[--depth];
       morton[nodes] = node.morton;
-      first[nodes + 1] = first[nodes] + aim_at_children(cameras, node, half_m, &sight[first[nodes]]);
+      first[nodes + 1] = first[nodes] + aim_at_children(cameras, node, &sight[first[nodes]]);
       ++nodes;
     }
     seen.visited += static_cast<std::uint32_t>(nodes);

@@ -33,6 +33,7 @@ bool profile_points(const SpaceProfilerConfig& config, std::span<const CloudPoin
   std::array<Sector, kSectors> sector{};
   profile.closest_obstacle_m = profile.obstacle_ahead_m = kInfinity;
   const Vector3 way = goal_W - p_WB;
+  const double way_m = way.norm();
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (i % 1024 == 0 && budget.spent(work)) return false;
     const CloudPoint& point = points[i];
@@ -40,7 +41,7 @@ bool profile_points(const SpaceProfilerConfig& config, std::span<const CloudPoin
     if (relevant_W.contains(point.p_W)) {
       const double distance_m = offset.norm();
       profile.closest_obstacle_m = std::fmin(profile.closest_obstacle_m, distance_m);
-      if (!(offset.dot(way) < kAhead * distance_m * way.norm()))
+      if (!(offset.dot(way) < kAhead * distance_m * way_m))
         profile.obstacle_ahead_m = std::fmin(profile.obstacle_ahead_m, distance_m);
     }
     const double range_m = core::hypot2(offset.x(), offset.y());
