@@ -20,7 +20,7 @@ enum class Action : std::uint8_t {
 inline constexpr std::size_t kActionCount = 6;
 [[nodiscard]] const char* to_string(Action action) noexcept;
 
-/// How each is detected, and from when on, is the table of platform/app/failsafe_monitor.hpp.
+/// How each is detected, and from when on, is the table of platform/flight/failsafe_monitor.hpp.
 enum class Condition : std::uint8_t {
   kBatteryLow,
   kBatteryCritical,

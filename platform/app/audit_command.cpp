@@ -9,18 +9,16 @@
 #include <string>
 #include <vector>
 
-#include "platform/app/board_profile.hpp"
-#include "platform/app/real_time_run.hpp"
-#include "platform/app/settings_file.hpp"
+#include "platform/board/board_profile.hpp"
+#include "platform/input/input_error.hpp"
+#include "platform/input/text_file.hpp"
+#include "platform/mission/audit_run.hpp"
+#include "platform/mission/settings_file.hpp"
 #include "platform/report/trace_csv.hpp"
 #include "platform/sitl/world/generator.hpp"
-#include "platform/sitl/world/input_error.hpp"
-#include "platform/sitl/world/text_file.hpp"
 
 namespace roborun::app {
 namespace {
-
-using sitl::InputError;
 
 struct AuditOptions {
   double seconds{60.0};
@@ -49,8 +47,8 @@ int compare(const AuditOptions& options) {
     throw InputError(
         fmt::format("--tolerance: {} is out of range: must be from 1 to 100", options.tolerance_ratio));
   constexpr std::string_view kWanted = "a file that roborun audit --json printed";
-  const std::string before = sitl::read_text(options.compare[0], kWanted);
-  const std::string after = sitl::read_text(options.compare[1], kWanted);
+  const std::string before = input::read_text(options.compare[0], kWanted);
+  const std::string after = input::read_text(options.compare[1], kWanted);
   report::Comparison result;
   try {
     result = report::compare_audits(before, after, options.tolerance_ratio);
@@ -66,7 +64,7 @@ int compare(const AuditOptions& options) {
 }
 
 /// SLOT:MILLISECONDS, in every run of the slot from the 400th of the flight lane or the 5th of others on.
-std::optional<Injection> injection_of(const std::string& text) {
+std::optional<mission::Injection> injection_of(const std::string& text) {
   if (text.empty()) return std::nullopt;
   const std::size_t colon = text.find(':');
   char* end = nullptr;
@@ -76,7 +74,7 @@ std::optional<Injection> injection_of(const std::string& text) {
         !(ms > 0.0 && ms <= 3.6e6))
       continue;
     const std::uint64_t from = spec.lane == core::LaneId::kFlight ? 400 : 5;
-    return Injection{spec.id, from_seconds(1e-3 * ms), from, UINT64_MAX, false};
+    return mission::Injection{spec.id, from_seconds(1e-3 * ms), from, UINT64_MAX, false};
   }
   throw InputError(
       fmt::format("--inject-spin: '{}' must be SLOT:MILLISECONDS, with a slot of the frame table", text));
@@ -94,20 +92,21 @@ int audit(const AuditOptions& options) {
                     "125, 160, 200, 250, "
                     "320 or 400",
                     options.rate_Hz));
-  RealTimeConfig config;
-  if (!options.settings.empty()) load_settings(options.settings, config.mission);
+  mission::RealTimeConfig config;
+  if (!options.settings.empty()) mission::load_settings(options.settings, config.mission);
   config.inject = injection_of(options.spin);
   const sitl::NamedEnvironment environment = sitl::environment(options.env);
   const sitl::World world = sitl::generate(environment.knobs, sitl::Mission::kPackageDelivery, options.seed);
   // Last, after everything that may be refused: the first time this measures the machine.
   std::string note;
-  const Profile profile = options.profile == "host" ? host(default_host_path({}), {}, 1.0, note)
-                                                    : load_profile(options.profile, {});
+  const board::Profile profile = options.profile == "host"
+                                     ? board::host(board::default_host_path({}), {}, 1.0, note)
+                                     : board::load_profile(options.profile, {});
   if (!note.empty()) fmt::print(stderr, "roborun: {}\n", note);
-  config.mission.costs = profile.costs;
-  config.mission.model = profile.model;
+  config.mission.flight.costs = profile.costs;
+  config.mission.flight.model = profile.model;
   config.mission.seed = options.seed;
-  config.mission.minor_frame = core::minor_frame_of(options.rate_Hz);
+  config.mission.flight.minor_frame = core::minor_frame_of(options.rate_Hz);
   config.seconds = options.seconds;
   config.best_effort = options.best_effort;
   config.load = options.load;
@@ -119,7 +118,7 @@ int audit(const AuditOptions& options) {
                    gpio::LineConfig{options.kill_lines[1], options.active_low, bias}};
   }
   const bool terminal = isatty(STDERR_FILENO) != 0;
-  const report::AuditReport result = run_real_time(world, config, [&](double done_s) {
+  const report::AuditReport result = mission::run_real_time(world, config, [&](double done_s) {
     if (terminal) fmt::print(stderr, "\raudit {:3.0f} of {:.0f} s   ", done_s, options.seconds);
   });
   if (terminal) fmt::print(stderr, "\r{:40}\r", "");
@@ -129,9 +128,9 @@ int audit(const AuditOptions& options) {
   else
     fmt::print("{}", report::audit_table(result));
   std::string error;
-  if (!options.html.empty()) error = report::write_file(options.html, report::audit_html(result));
+  if (!options.html.empty()) error = input::write_file(options.html, report::audit_html(result));
   if (error.empty() && !options.trace.empty())
-    error = report::write_file(options.trace, report::perfetto_trace(result));
+    error = input::write_file(options.trace, report::perfetto_trace(result));
   if (!error.empty()) throw InputError(error);
   const bool clean = result.heap_calls_after_start == 0 && report::minor_faults(result) == 0 &&
                      report::major_faults(result) == 0 && result.stopped_by.empty();

@@ -8,12 +8,13 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "platform/app/board_profile.hpp"
-#include "platform/app/progress_line.hpp"
-#include "platform/app/stopping_sweep.hpp"
+#include "platform/board/board_profile.hpp"
+#include "platform/board/stopping_sweep.hpp"
+#include "platform/input/input_error.hpp"
+#include "platform/input/text_file.hpp"
 #include "platform/report/calibration_plot.hpp"
+#include "platform/report/progress_line.hpp"
 #include "platform/report/trace_csv.hpp"
-#include "platform/sitl/world/input_error.hpp"
 
 namespace roborun::app {
 namespace {
@@ -21,7 +22,7 @@ namespace {
 struct CalibrateOptions {
   std::string out;
   std::string plot;
-  BackendNames backends{};
+  board::BackendNames backends{};
   int repeats{25};
   bool stopping{false};
   bool json{false};
@@ -33,16 +34,16 @@ constexpr std::array<const char*, 3> kKey{"map", "export", "planner"};
 
 void write(const std::string& path, const std::string& text) {
   if (path.empty()) return;
-  const std::string error = report::write_file(path, text);
-  if (!error.empty()) throw sitl::InputError(error);
+  const std::string error = input::write_file(path, text);
+  if (!error.empty()) throw InputError(error);
 }
 
-std::string plot_of(const BoardProfile& board, const BoardSweep& sweep) {
+std::string plot_of(const board::BoardProfile& board, const board::BoardSweep& sweep) {
   std::vector<report::CalibrationPanel> panels;
   for (const bool p99 : {false, true}) {
     for (std::size_t i = 0; i < 3; ++i) {
-      const StageModel& stage = board.stage[i];
-      const BoardSweep::Stage& points = sweep.stage[i];
+      const board::StageModel& stage = board.stage[i];
+      const board::BoardSweep::Stage& points = sweep.stage[i];
       const governor::LatencyModel& model = p99 ? stage.p99 : stage.mean;
       report::CalibrationPanel panel{
           fmt::format("{}, {}: {:.1f} % off", kTitle[i], p99 ? "p99" : "mean",
@@ -67,11 +68,11 @@ std::string plot_of(const BoardProfile& board, const BoardSweep& sweep) {
 }
 
 int calibrate_board(const CalibrateOptions& options) {
-  BoardSweep sweep;
-  BoardProfile board;
+  board::BoardSweep sweep;
+  board::BoardProfile board;
   {
-    ProgressLine line;
-    board = measure_board(
+    report::ProgressLine line;
+    board = board::measure_board(
         options.backends, options.repeats,
         [&line](double done) {
           line.show(fmt::format("measuring map, export and planner: {:3.0f} %, {:.0f} s left", 100.0 * done,
@@ -79,14 +80,14 @@ int calibrate_board(const CalibrateOptions& options) {
         },
         sweep);
   }
-  write(options.out, to_toml(board));
+  write(options.out, board::to_toml(board));
   write(options.plot, plot_of(board, sweep));
   if (options.json) {
     nlohmann::ordered_json json;
     json["machine"] = board.machine;
     json["samples_a_point"] = 4 * options.repeats;
     for (std::size_t i = 0; i < 3; ++i) {
-      const StageModel& s = board.stage[i];
+      const board::StageModel& s = board.stage[i];
       json["stages"][kKey[i]] = {{"mean_error_ratio", s.mean_error.mean_relative},
                                  {"mean_error_max_ratio", s.mean_error.max_relative},
                                  {"p99_error_ratio", s.p99_error.mean_relative},
@@ -99,7 +100,7 @@ int calibrate_board(const CalibrateOptions& options) {
              4 * options.repeats);
   fmt::print("{:<10} {:>12} {:>12} {:>12} {:>12}\n", "stage", "mean: avg %", "max %", "p99: avg %", "max %");
   for (std::size_t i = 0; i < 3; ++i) {
-    const StageModel& s = board.stage[i];
+    const board::StageModel& s = board.stage[i];
     fmt::print("{:<10} {:>12.1f} {:>12.1f} {:>12.1f} {:>12.1f}\n", kKey[i],
                100.0 * s.mean_error.mean_relative, 100.0 * s.mean_error.max_relative,
                100.0 * s.p99_error.mean_relative, 100.0 * s.p99_error.max_relative);
@@ -115,14 +116,14 @@ int calibrate_board(const CalibrateOptions& options) {
 }
 
 int calibrate_stopping(const CalibrateOptions& options) {
-  std::vector<StoppingPoint> points;
+  std::vector<board::StoppingPoint> points;
   {
-    ProgressLine line;
-    points = stopping_sweep(kSpeeds_mps, 8, [&line](double done) {
+    report::ProgressLine line;
+    points = board::stopping_sweep(kSpeeds_mps, 8, [&line](double done) {
       line.show(fmt::format("braking from {} speeds: {:3.0f} %", kSpeeds_mps.size(), 100.0 * done));
     });
   }
-  const StoppingFit fit = fit_stopping(points);
+  const board::StoppingFit fit = board::fit_stopping(points);
   const governor::StoppingModel& m = fit.model;
   std::string toml = fmt::format(
       "# How far the simulated quadrotor travels until it stands; written by roborun calibrate --stopping.\n"
@@ -131,7 +132,7 @@ int calibrate_stopping(const CalibrateOptions& options) {
   write(options.out, toml);
   if (options.json) {
     nlohmann::ordered_json json;
-    for (const StoppingPoint& p : points) json["points"].push_back({p.speed_mps, p.distance_m});
+    for (const board::StoppingPoint& p : points) json["points"].push_back({p.speed_mps, p.distance_m});
     json["quadratic_s2pm"] = m.quadratic_s2pm;
     json["linear_s"] = m.linear_s;
     json["constant_m"] = m.constant_m;
@@ -140,7 +141,7 @@ int calibrate_stopping(const CalibrateOptions& options) {
     return 0;
   }
   fmt::print("{:>8} {:>11} {:>9} {:>9}\n", "v, m/s", "stop, m", "fit, m", "used, m");
-  for (const StoppingPoint& p : points) {
+  for (const board::StoppingPoint& p : points) {
     fmt::print("{:>8.1f} {:>11.3f} {:>9.3f} {:>9.3f}\n", p.speed_mps, p.distance_m, m.distance_m(p.speed_mps),
                governor::kSitlQuadrotorStopping.distance_m(p.speed_mps));
   }
@@ -177,8 +178,8 @@ void add_calibrate_command(CLI::App& app, std::function<int()>& run) {
   command->callback([options, &run] {
     run = [options] {
       for (const std::string& path : {options->out, options->plot}) {
-        const std::string error = report::cannot_write(path);
-        if (!error.empty()) throw sitl::InputError(error);
+        const std::string error = input::cannot_write(path);
+        if (!error.empty()) throw InputError(error);
       }
       return options->stopping ? calibrate_stopping(*options) : calibrate_board(*options);
     };

@@ -6,7 +6,7 @@
 
 namespace roborun::app {
 
-/// Adds the subcommand. Exit code 0; throws sitl::InputError if a file cannot be written.
+/// Adds the subcommand. Exit code 0; throws InputError if a file cannot be written.
 void add_calibrate_command(CLI::App& app, std::function<int()>& run);
 
 }  // namespace roborun::app

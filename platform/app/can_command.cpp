@@ -17,7 +17,7 @@
 #include "platform/can/candump.hpp"
 #include "platform/can/message_json.hpp"
 #include "platform/can/socket_can.hpp"
-#include "platform/sitl/world/input_error.hpp"
+#include "platform/input/input_error.hpp"
 
 namespace roborun::app {
 namespace {
@@ -32,7 +32,7 @@ void for_each_line(const std::string& path, Visit&& visit) {
   const bool standard_input = path.empty() || path == "-";
   if (!standard_input) {
     file.open(path);
-    if (!file) throw sitl::InputError(fmt::format("{}: cannot be opened", path));
+    if (!file) throw InputError(fmt::format("{}: cannot be opened", path));
   }
   std::istream& in = standard_input ? std::cin : file;
   std::string line;
@@ -220,7 +220,7 @@ int encode(const std::string& path) {
     try {
       encode_one(Json::parse(text), index++);
     } catch (const std::exception& error) {
-      throw sitl::InputError(fmt::format("line {}: {}", number, error.what()));
+      throw InputError(fmt::format("line {}: {}", number, error.what()));
     }
   });
   return 0;
@@ -232,7 +232,7 @@ MonotonicTime now() {
 }
 
 void open_or_refuse(can::SocketCan& bus, const std::string& interface) {
-  if (const std::string why = bus.open(interface); !why.empty()) throw sitl::InputError(why);
+  if (const std::string why = bus.open(interface); !why.empty()) throw InputError(why);
 }
 
 int monitor(const std::string& interface, bool json, double duration_s) {
@@ -265,7 +265,7 @@ int monitor(const std::string& interface, bool json, double duration_s) {
 int send_esc(const std::string& interface, bool props_off, int count, double throttle_ratio,
              double duration_s) {
   if (!props_off)
-    throw sitl::InputError("send-esc turns motors: take the propellers off and say so with --props-off");
+    throw InputError("send-esc turns motors: take the propellers off and say so with --props-off");
   can::SocketCan bus;
   open_or_refuse(bus, interface);
   const auto esc_count = static_cast<std::uint8_t>(count);

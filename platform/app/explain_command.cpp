@@ -10,13 +10,11 @@
 #include <vector>
 
 #include "core/executive/stage_budget.hpp"
-#include "platform/sitl/world/input_error.hpp"
-#include "platform/sitl/world/text_file.hpp"
+#include "platform/input/input_error.hpp"
+#include "platform/input/text_file.hpp"
 
 namespace roborun::app {
 namespace {
-
-using sitl::InputError;
 
 std::vector<std::string> fields_of(const std::string& line) {
   std::vector<std::string> fields;
@@ -178,7 +176,7 @@ void add_explain_command(CLI::App& app, std::function<int()>& run) {
   command->add_option("--design", options->design, "If the trace holds several [the first]");
   command->callback([options, &run] {
     run = [options] {
-      const std::string csv = sitl::read_text(options->file, "a file that roborun fly --trace wrote");
+      const std::string csv = input::read_text(options->file, "a file that roborun fly --trace wrote");
       fmt::print("{}", explain_decision(options->file, csv, options->at_s, options->design));
       return 0;
     };

@@ -8,7 +8,7 @@
 namespace roborun::app {
 
 /// `csv`: what `roborun fly --trace` wrote. The decision that was in force at `at_s`, of the given design
-/// (empty: the first in the file). Throws sitl::InputError if the text is no such trace or the time is
+/// (empty: the first in the file). Throws InputError if the text is no such trace or the time is
 /// outside it.
 [[nodiscard]] std::string explain_decision(const std::string& name, const std::string& csv, double at_s,
                                            const std::string& design);

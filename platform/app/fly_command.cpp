@@ -10,23 +10,22 @@
 #include <string>
 #include <vector>
 
-#include "platform/app/arguments.hpp"
-#include "platform/app/board_profile.hpp"
-#include "platform/app/mission.hpp"
-#include "platform/app/progress_line.hpp"
-#include "platform/app/scene.hpp"
-#include "platform/app/settings_file.hpp"
+#include "platform/board/board_profile.hpp"
+#include "platform/evaluation/scene.hpp"
+#include "platform/input/arguments.hpp"
+#include "platform/input/input_error.hpp"
+#include "platform/input/text_file.hpp"
+#include "platform/mission/mission.hpp"
+#include "platform/mission/settings_file.hpp"
+#include "platform/report/progress_line.hpp"
 #include "platform/report/svg_plot.hpp"
 #include "platform/report/table.hpp"
 #include "platform/report/trace_csv.hpp"
 #include "platform/sitl/world/generator.hpp"
-#include "platform/sitl/world/input_error.hpp"
 #include "platform/sitl/world/world_file.hpp"
 
 namespace roborun::app {
 namespace {
-
-using sitl::InputError;
 
 struct FlyOptions {
   std::string env{"14"};
@@ -51,7 +50,7 @@ struct FlyOptions {
 
 std::optional<Vector3> point_of(const char* option, const std::string& text) {
   if (text.empty()) return std::nullopt;
-  const std::vector<std::string> parts = split(text);
+  const std::vector<std::string> parts = input::split(text);
   Vector3 p_W = Vector3::Zero();
   bool ok = parts.size() == 3;
   for (std::size_t i = 0; ok && i < 3; ++i) {
@@ -64,16 +63,17 @@ std::optional<Vector3> point_of(const char* option, const std::string& text) {
   return p_W;
 }
 
-Profile profile_of(const FlyOptions& options) {
+board::Profile profile_of(const FlyOptions& options) {
   if (!(options.host_factor > 0.0 && options.host_factor <= 1000.0)) {
     throw InputError(
         fmt::format("--host-factor: {} is out of range: must be above 0, at most 1000", options.host_factor));
   }
-  const BackendNames backends{options.map, options.planner};
-  if (options.profile != "host") return load_profile(options.profile, backends);
+  const board::BackendNames backends{options.map, options.planner};
+  if (options.profile != "host") return board::load_profile(options.profile, backends);
   std::string note;
-  const Profile profile = host(options.host_file.empty() ? default_host_path(backends) : options.host_file,
-                               backends, options.host_factor, note);
+  const board::Profile profile =
+      board::host(options.host_file.empty() ? board::default_host_path(backends) : options.host_file,
+                  backends, options.host_factor, note);
   if (!note.empty()) fmt::print(stderr, "roborun: {}\n", note);
   return profile;
 }
@@ -81,9 +81,10 @@ Profile profile_of(const FlyOptions& options) {
 int fly(const FlyOptions& options) {
   // Everything is checked before the first metre is flown.
   std::vector<governor::Design> designs;
-  for (const std::string& name : split(options.design)) designs.push_back(design_of("--design", name));
-  const sitl::Mission mission = mission_of(options.mission);
-  const std::uint64_t seed = seed_of("--seed", options.seed);
+  for (const std::string& name : input::split(options.design))
+    designs.push_back(mission::design_of("--design", name));
+  const sitl::Mission mission = sitl::mission_of(options.mission);
+  const std::uint64_t seed = input::seed_of("--seed", options.seed);
   const auto colour =
       std::find(report::kPathColourName.begin(), report::kPathColourName.end(), options.colour);
   const bool maps = options.colour == "all";
@@ -93,11 +94,11 @@ int fly(const FlyOptions& options) {
   if (!options.record.empty() && designs.size() != 1)
     throw InputError("--record: one flight a file: must go with one --design");
   for (const std::string& path : {options.trace, options.plot, options.record}) {
-    const std::string error = report::cannot_write(path);
+    const std::string error = input::cannot_write(path);
     if (!error.empty()) throw InputError(error);
   }
-  MissionConfig config;
-  if (!options.settings.empty()) load_settings(options.settings, config);
+  mission::MissionConfig config;
+  if (!options.settings.empty()) mission::load_settings(options.settings, config);
   const sitl::Endpoints endpoints{point_of("--start", options.start), point_of("--goal", options.goal)};
   std::string env;
   std::string title;
@@ -116,22 +117,22 @@ int fly(const FlyOptions& options) {
     zone_m = named.knobs.spread_m;
     title = fmt::format("Environment {} ({}), {}, seed {}", named.number, named.name, options.mission, seed);
   }
-  const Profile profile = profile_of(options);
+  const board::Profile profile = profile_of(options);
   title += fmt::format(", cost profile {}", options.profile);
 
   config.profile_name = options.profile;
-  config.costs = profile.costs;
-  config.model = profile.model;
+  config.flight.costs = profile.costs;
+  config.flight.model = profile.model;
   config.seed = seed;
   config.record = options.record;
-  config.map_backend = options.map;
-  config.planner_backend = options.planner;
+  config.backends.map = options.map;
+  config.backends.planner = options.planner;
   std::vector<report::MissionReport> reports;
   bool all_reached = true;
   for (const governor::Design design : designs) {
-    config.design = design;
-    ProgressLine line;
-    reports.push_back(fly_mission(*world, config, [&line, design](const Progress& p) {
+    config.flight.design = design;
+    report::ProgressLine line;
+    reports.push_back(mission::fly_mission(*world, config, [&line, design](const mission::Progress& p) {
       if (!line.due()) return;
       line.show(fmt::format("{:<12} {:3.0f} % of the way, {:6.0f} s flown, {:4.1f} m/s, {:3.0f} x real time",
                             governor::to_string(design), 100.0 * p.done_ratio, p.time_s, p.speed_mps,
@@ -154,11 +155,11 @@ int fly(const FlyOptions& options) {
       fmt::print("{:<12} state_hash {}, {:.0f} x real time\n", r.design, r.state_hash, r.real_time_factor);
   }
   std::string error;
-  if (!options.trace.empty()) error = report::write_trace_csv(options.trace, reports);
+  if (!options.trace.empty()) error = input::write_file(options.trace, report::trace_csv(reports));
   if (error.empty() && !options.plot.empty()) {
-    const report::Scene scene = scene_of(*world, title, zone_m);
+    const report::Scene scene = evaluation::scene_of(*world, title, zone_m);
     const auto by = static_cast<report::PathColour>(colour - report::kPathColourName.begin());
-    error = report::write_file(
+    error = input::write_file(
         options.plot, maps ? report::maps_svg(scene, reports) : report::mission_svg(scene, reports, by));
   }
   if (!error.empty()) throw InputError(error);

@@ -20,7 +20,7 @@
 #include "platform/app/scenario_command.hpp"
 #include "platform/app/solve_command.hpp"
 #include "platform/app/sweep_command.hpp"
-#include "platform/sitl/world/input_error.hpp"
+#include "platform/input/input_error.hpp"
 
 namespace {
 
@@ -58,7 +58,7 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
     return app.exit(done);  // --help and --version
   } catch (const CLI::ParseError& error) {
     return complain(fmt::format("{} (see roborun --help)", error.what()));
-  } catch (const roborun::sitl::InputError& error) {
+  } catch (const roborun::InputError& error) {
     return complain(error.what());
   } catch (const std::exception& error) {
     return complain(fmt::format("unexpected: {}", error.what()));

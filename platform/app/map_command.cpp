@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "platform/input/input_error.hpp"
 #include "platform/report/map_picture.hpp"
-#include "platform/sitl/world/input_error.hpp"
 #include "platform/sitl/world/octomap_file.hpp"
 
 namespace roborun::app {
@@ -33,7 +33,7 @@ void write_file(const std::string& path, const std::string& text) {
   std::ofstream file(path, std::ios::binary);
   file << text;
   file.close();
-  if (!file) throw sitl::InputError(fmt::format("{}: cannot be written", path));
+  if (!file) throw InputError(fmt::format("{}: cannot be written", path));
 }
 
 std::uint64_t cells(const OctomapLeaf& leaf) { return leaf.end() - leaf.morton; }
@@ -78,8 +78,8 @@ int compare(const MapOptions& options) {
   const OctomapLeaves first = sitl::load_octomap(options.file);
   const OctomapLeaves second = sitl::load_octomap(options.second);
   if (first.resolution_m < second.resolution_m || first.resolution_m > second.resolution_m)
-    throw sitl::InputError(fmt::format("{}: resolution {} m, but {} has {} m: must be equal", options.second,
-                                       second.resolution_m, options.file, first.resolution_m));
+    throw InputError(fmt::format("{}: resolution {} m, but {} has {} m: must be equal", options.second,
+                                 second.resolution_m, options.file, first.resolution_m));
   const sitl::OctomapDifference d = sitl::diff(first, second);
   if (options.json) {
     const nlohmann::ordered_json json = {{"same_cells", d.same},
@@ -148,8 +148,8 @@ int view(const MapOptions& options) {
   const Aabb box = map.bounds_W();
   const double height_m = options.has_height ? options.height_m : box.center().z();
   if (!(height_m >= box.min_W.z() && height_m < box.max_W.z()))
-    throw sitl::InputError(fmt::format("--height {}: must be from {:.2f} to below {:.2f} m, where the map is",
-                                       height_m, box.min_W.z(), box.max_W.z()));
+    throw InputError(fmt::format("--height {}: must be from {:.2f} to below {:.2f} m, where the map is",
+                                 height_m, box.min_W.z(), box.max_W.z()));
   const auto index = [&map](double p_m) {
     return static_cast<int>(p_m / map.resolution_m + (1 << (sitl::kOctomapDepth - 1)));
   };

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "platform/app/board_profile.hpp"
-#include "platform/app/real_time_run.hpp"
+#include "platform/board/board_profile.hpp"
+#include "platform/mission/audit_run.hpp"
 #include "platform/sitl/world/generator.hpp"
 
 namespace roborun::app {
@@ -22,17 +22,17 @@ struct MemoryOptions {
 int memory(const MemoryOptions& options) {
   const sitl::World world =
       sitl::generate(sitl::environment(options.env).knobs, sitl::Mission::kPackageDelivery, 1);
-  const Profile profile = paper();
-  MissionConfig config;
-  config.costs = profile.costs;
-  config.model = profile.model;
+  const board::Profile profile = board::paper();
+  mission::MissionConfig config;
+  config.flight.costs = profile.costs;
+  config.flight.model = profile.model;
   // Lockstep: what a mission uses does not depend on how fast it is simulated.
   std::vector<report::PoolUse> pools;
   if (options.fly_s > 0.0) {
-    config.time_limit_s = options.fly_s;
-    pools = fly_mission(world, config, {}).pools;
+    config.judge.time_limit_s = options.fly_s;
+    pools = mission::fly_mission(world, config, {}).pools;
   } else {
-    pools = memory_plan_of(world, config);
+    pools = mission::memory_plan_of(world, config);
   }
   std::size_t total = 0;
   for (const report::PoolUse& p : pools) total += p.element_bytes * p.count;

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "platform/app/progress_line.hpp"
-#include "platform/app/recording.hpp"
+#include "platform/mission/replay.hpp"
+#include "platform/report/progress_line.hpp"
 
 namespace roborun::app {
 namespace {
@@ -18,8 +18,8 @@ struct ReplayOptions {
 };
 
 int replay(const ReplayOptions& options) {
-  ProgressLine line;
-  const ReplayResult r = replay_flight(options.file, [&line](double done_s) {
+  report::ProgressLine line;
+  const mission::ReplayResult r = mission::replay_flight(options.file, [&line](double done_s) {
     if (line.due())
       line.show(fmt::format("{:.0f} s replayed, {:.0f} x real time", done_s, done_s / line.elapsed_s()));
   });

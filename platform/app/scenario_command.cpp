@@ -11,19 +11,19 @@
 #include <numeric>
 #include <thread>
 
-#include "platform/app/arguments.hpp"
-#include "platform/app/progress_line.hpp"
-#include "platform/app/scenario_file.hpp"
-#include "platform/app/worker_processes.hpp"
+#include "platform/evaluation/worker_processes.hpp"
+#include "platform/input/arguments.hpp"
+#include "platform/input/input_error.hpp"
+#include "platform/input/text_file.hpp"
+#include "platform/mission/scenario_file.hpp"
+#include "platform/report/progress_line.hpp"
 #include "platform/report/svg.hpp"
 #include "platform/report/trace_csv.hpp"
-#include "platform/sitl/world/input_error.hpp"
 
 namespace roborun::app {
 namespace {
 
 using nlohmann::json;
-using sitl::InputError;
 namespace fs = std::filesystem;
 
 struct ScenarioOptions {
@@ -47,13 +47,13 @@ std::vector<std::string> files_of(const std::string& path) {
 }
 
 /// Everything that is told of one scenario: a pure function of its file.
-json verdict_of(const Scenario& scenario) {
-  const report::MissionReport report = fly_scenario(scenario);
+json verdict_of(const mission::Scenario& scenario) {
+  const report::MissionReport report = mission::fly_scenario(scenario);
   json actions = json::array();
   for (const report::FailsafeRecord& r : report.safety.actions)
     actions.push_back(
         {{"time_s", r.time_s}, {"action", r.action}, {"phase", r.phase}, {"conditions", r.conditions}});
-  const std::vector<std::string> complaints = complaints_of(scenario, report);
+  const std::vector<std::string> complaints = mission::complaints_of(scenario, report);
   return {{"name", scenario.name},
           {"about", scenario.about},
           {"passed", complaints.empty()},
@@ -100,18 +100,18 @@ void tell(const json& v) {
 }
 
 int run_scenarios(const ScenarioOptions& options) {
-  const int jobs = jobs_of(options.jobs);
-  if (const std::string why = report::cannot_write(options.junit); !why.empty()) throw InputError(why);
+  const int jobs = input::jobs_of(options.jobs);
+  if (const std::string why = input::cannot_write(options.junit); !why.empty()) throw InputError(why);
   // Every file is checked before the first one is flown.
-  std::vector<Scenario> scenarios;
-  for (const std::string& file : files_of(options.path)) scenarios.push_back(load_scenario(file));
+  std::vector<mission::Scenario> scenarios;
+  for (const std::string& file : files_of(options.path)) scenarios.push_back(mission::load_scenario(file));
 
   std::vector<json> verdicts(scenarios.size());
   std::vector<std::size_t> tasks(scenarios.size());
   std::iota(tasks.begin(), tasks.end(), std::size_t{0});
   std::size_t done = 0;
-  ProgressLine line;
-  WorkerCalls calls;
+  report::ProgressLine line;
+  evaluation::WorkerCalls calls;
   calls.work = [&](std::size_t i) { return verdict_of(scenarios[i]).dump(); };
   calls.answered = [&](std::size_t i, const std::string& answer) {
     verdicts[i] = json::parse(answer);
@@ -121,7 +121,7 @@ int run_scenarios(const ScenarioOptions& options) {
   calls.died = [&](std::size_t i) {
     throw InputError(fmt::format("{}: the flight's process died", scenarios[i].name));
   };
-  (void)run_in_processes(tasks, jobs, calls);
+  (void)evaluation::run_in_processes(tasks, jobs, calls);
 
   const bool passed =
       std::all_of(verdicts.begin(), verdicts.end(), [](const json& v) { return v["passed"]; });
@@ -137,7 +137,7 @@ int run_scenarios(const ScenarioOptions& options) {
     fmt::print("{} of {} passed\n", good, verdicts.size());
   }
   if (!options.junit.empty()) {
-    if (const std::string why = report::write_file(options.junit, junit_of(verdicts)); !why.empty())
+    if (const std::string why = input::write_file(options.junit, junit_of(verdicts)); !why.empty())
       throw InputError(why);
   }
   return passed ? 0 : 1;

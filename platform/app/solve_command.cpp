@@ -13,15 +13,13 @@
 #include <set>
 
 #include "governor/solver/certificate.hpp"
-#include "platform/app/board_profile.hpp"
-#include "platform/sitl/world/input_error.hpp"
+#include "platform/board/board_profile.hpp"
+#include "platform/input/input_error.hpp"
 
 namespace roborun::app {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using sitl::InputError;
-
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Python's NaN, Infinity and -Infinity, outside of strings, into strings.
@@ -76,7 +74,7 @@ class Problem {
       refuse("q", "give either q (3 rows of 4 numbers) or profile (paper, or a board file)");
     if (json_.contains("profile")) {
       if (!json_["profile"].is_string()) refuse("profile", "must be paper or the path of a board file");
-      p.model = load_profile(json_["profile"].get<std::string>(), {}).model;
+      p.model = board::load_profile(json_["profile"].get<std::string>(), {}).model;
       return p;
     }
     const Json& q = json_["q"];

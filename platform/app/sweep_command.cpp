@@ -10,18 +10,16 @@
 #include <thread>
 
 #include "core/record/state_hash.hpp"
-#include "platform/app/arguments.hpp"
-#include "platform/app/settings_file.hpp"
-#include "platform/app/sweep_run.hpp"
+#include "platform/evaluation/sweep_run.hpp"
+#include "platform/input/arguments.hpp"
+#include "platform/input/input_error.hpp"
+#include "platform/input/text_file.hpp"
+#include "platform/mission/settings_file.hpp"
 #include "platform/report/evaluation_table.hpp"
 #include "platform/sitl/world/generator.hpp"
-#include "platform/sitl/world/input_error.hpp"
-#include "platform/sitl/world/text_file.hpp"
 
 namespace roborun::app {
 namespace {
-
-using sitl::InputError;
 
 struct SweepOptions {
   std::string suite{"paper27"};
@@ -48,7 +46,7 @@ void refuse_twice(const char* option, const std::vector<T>& values) {
   }
 }
 
-std::string profile_digest(const Profile& profile) {
+std::string profile_digest(const board::Profile& profile) {
   core::StateHash hash;
   for (const core::StageCost& cost : profile.costs.stage) {
     for (const double s : cost.fixed_s) hash.add(s);
@@ -62,12 +60,12 @@ std::string profile_digest(const Profile& profile) {
   return fmt::format("{:016x}", hash.value());
 }
 
-void set_shard(const std::string& text, SweepPlan& plan) {
+void set_shard(const std::string& text, evaluation::SweepPlan& plan) {
   constexpr int kMost = 10000;
   const std::size_t slash = text.find('/');
   const auto count =
-      slash == std::string::npos ? std::nullopt : whole_number(text.substr(slash + 1), 1, kMost);
-  const auto index = count ? whole_number(text.substr(0, slash), 1, *count) : std::nullopt;
+      slash == std::string::npos ? std::nullopt : input::whole_number(text.substr(slash + 1), 1, kMost);
+  const auto index = count ? input::whole_number(text.substr(0, slash), 1, *count) : std::nullopt;
   if (!index)
     throw InputError(fmt::format(
         "--shard: '{}' is not a shard: must be I/N with 1 <= I <= N <= {}, as in 2/4", text, kMost));
@@ -75,22 +73,23 @@ void set_shard(const std::string& text, SweepPlan& plan) {
   plan.shards = *count;
 }
 
-SweepPlan plan_of(const SweepOptions& options, SweepInputs& inputs) {
-  SweepPlan plan;
+evaluation::SweepPlan plan_of(const SweepOptions& options, evaluation::SweepInputs& inputs) {
+  evaluation::SweepPlan plan;
   if (options.suite != plan.suite)
     throw InputError(fmt::format("--suite: unknown suite '{}': must be paper27", options.suite));
-  (void)mission_of(options.mission);
+  (void)sitl::mission_of(options.mission);
   plan.mission = options.mission;
   if (options.environments.empty()) {
     for (int number = 1; number <= 27; ++number) plan.environments.push_back(number);
   } else {
-    for (const std::string& name : split(options.environments))
+    for (const std::string& name : input::split(options.environments))
       plan.environments.push_back(sitl::environment(name).number);
   }
   std::sort(plan.environments.begin(), plan.environments.end());
-  plan.designs = split(options.designs);
-  for (const std::string& name : plan.designs) (void)design_of("--designs", name);
-  for (const std::string& text : split(options.seeds)) plan.seeds.push_back(seed_of("--seeds", text));
+  plan.designs = input::split(options.designs);
+  for (const std::string& name : plan.designs) (void)mission::design_of("--designs", name);
+  for (const std::string& text : input::split(options.seeds))
+    plan.seeds.push_back(input::seed_of("--seeds", text));
   refuse_twice("--environments", plan.environments);
   refuse_twice("--designs", plan.designs);
   refuse_twice("--seeds", plan.seeds);
@@ -98,12 +97,12 @@ SweepPlan plan_of(const SweepOptions& options, SweepInputs& inputs) {
   plan.map = options.map;
   plan.planner = options.planner;
   if (!options.settings.empty()) {
-    load_settings(options.settings, inputs.base);
-    plan.settings = digest_of(sitl::read_text(options.settings, "a readable TOML file"));
+    mission::load_settings(options.settings, inputs.base);
+    plan.settings = evaluation::digest_of(input::read_text(options.settings, "a readable TOML file"));
   }
   std::vector<std::string> names;
-  for (const std::string& text : split(options.profiles)) {
-    const Profile profile = load_profile(text, {plan.map, plan.planner});
+  for (const std::string& text : input::split(options.profiles)) {
+    const board::Profile profile = board::load_profile(text, {plan.map, plan.planner});
     // Machines of a cluster keep the same file in different folders.
     const std::string name = std::filesystem::path(text).stem().string();
     names.push_back(name);
@@ -111,16 +110,16 @@ SweepPlan plan_of(const SweepOptions& options, SweepInputs& inputs) {
     inputs.profile[name] = profile;
   }
   refuse_twice("--profile", names);
-  plan.build = digest_of(sitl::read_text("/proc/self/exe", "this program"));
+  plan.build = evaluation::digest_of(input::read_text("/proc/self/exe", "this program"));
   return plan;
 }
 
-void tell(const SweepStore& store, const SweepOptions& options) {
-  const std::vector<report::SweepRow> rows = rows_of(store);
-  const SweepPlan& plan = store.plan();
+void tell(const evaluation::SweepStore& store, const SweepOptions& options) {
+  const std::vector<report::SweepRow> rows = evaluation::rows_of(store);
+  const evaluation::SweepPlan& plan = store.plan();
   // The report is of the whole sweep: `merge` writes it for shards.
   const bool report = plan.shards == 1 && !rows.empty();
-  if (report) write_sweep_report(store);
+  if (report) evaluation::write_sweep_report(store);
   if (options.json) {
     fmt::print("{}\n", report::sweep_json(plan.suite, rows, store.complete()));
     return;
@@ -133,12 +132,12 @@ void tell(const SweepStore& store, const SweepOptions& options) {
 }
 
 int sweep(const SweepOptions& options) {
-  SweepInputs inputs;
-  const SweepPlan plan = plan_of(options, inputs);
-  const int jobs = jobs_of(options.jobs);
-  try_sweep(plan, inputs);
-  SweepStore store(options.out, plan);
-  const bool complete = fly_sweep(store, inputs, jobs);
+  evaluation::SweepInputs inputs;
+  const evaluation::SweepPlan plan = plan_of(options, inputs);
+  const int jobs = input::jobs_of(options.jobs);
+  evaluation::try_sweep(plan, inputs);
+  evaluation::SweepStore store(options.out, plan);
+  const bool complete = evaluation::fly_sweep(store, inputs, jobs);
   tell(store, options);
   if (!complete)
     fmt::print(stderr, "roborun: stopped; what was flown is kept: the same command goes on from there\n");
@@ -146,8 +145,8 @@ int sweep(const SweepOptions& options) {
 }
 
 int merge(const SweepOptions& options) {
-  merge_shards(options.merged, options.out);
-  const SweepStore store(options.out, plan_of_folder(options.out));
+  evaluation::merge_shards(options.merged, options.out);
+  const evaluation::SweepStore store(options.out, evaluation::plan_of_folder(options.out));
   tell(store, options);
   return store.complete() ? 0 : 1;
 }
@@ -155,8 +154,8 @@ int merge(const SweepOptions& options) {
 int compare(const SweepOptions& options) {
   std::vector<report::SweepRow> rows;
   for (const std::string& folder : options.merged) {
-    const SweepStore store(folder, plan_of_folder(folder));
-    for (report::SweepRow& row : rows_of(store)) rows.push_back(std::move(row));
+    const evaluation::SweepStore store(folder, evaluation::plan_of_folder(folder));
+    for (report::SweepRow& row : evaluation::rows_of(store)) rows.push_back(std::move(row));
   }
   fmt::print("{}", report::kernel_table(rows));
   return 0;

@@ -1,45 +1,10 @@
 #include "platform/report/trace_csv.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
-
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 
 namespace roborun::report {
 
-std::string cannot_write(const std::string& path) {
-  if (path.empty()) return {};
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  std::error_code error;
-  const bool is_folder = std::filesystem::is_directory(path, error);
-  if (!is_folder && access(folder.empty() ? "." : folder.c_str(), W_OK) == 0) return {};
-  return is_folder ? fmt::format("{}: cannot be written: it is a folder", path)
-                   : fmt::format("{}: cannot be written: the folder must exist and be writable", path);
-}
-
-std::string write_file(const std::string& path, const std::string& text) {
-  const std::string part = path + ".part";
-  {
-    std::ofstream file(part, std::ios::binary | std::ios::trunc);
-    file << text;
-    file.flush();
-    if (!file) {
-      std::error_code ignored;
-      std::filesystem::remove(part, ignored);
-      return fmt::format("{}: cannot be written: the folder must exist and be writable", path);
-    }
-  }
-  std::error_code error;
-  std::filesystem::rename(part, path, error);
-  if (!error) return {};
-  std::error_code ignored;
-  std::filesystem::remove(part, ignored);
-  return fmt::format("{}: cannot be written: {}", path, error.message());
-}
-
-std::string write_trace_csv(const std::string& path, std::span<const MissionReport> missions) {
+std::string trace_csv(std::span<const MissionReport> missions) {
   std::string text =
       "design,seed,time_s,x_m,y_m,z_m,speed_mps,speed_limit_mps,p0_m,p1_m,v0_m3,v1_m3,v2_m3,time_budget_s,"
       "budget_source,"
@@ -65,7 +30,7 @@ std::string write_trace_csv(const std::string& path, std::span<const MissionRepo
                       d.solver, d.active, d.planner_status, d.smoother_status, d.missed ? 1 : 0);
     }
   }
-  return write_file(path, text);
+  return text;
 }
 
 }  // namespace roborun::report

@@ -60,6 +60,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   [[nodiscard]] double known_volume_m3() const noexcept override;
   [[nodiscard]] std::size_t bytes() const noexcept override;
   [[nodiscard]] std::uint64_t digest() const noexcept override;
+  [[nodiscard]] std::uint64_t refusals() const noexcept override { return counters_.bricks_refused; }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
   /// Of bytes(): what the known space of now needs, its share of the table of positions included.
   [[nodiscard]] std::size_t used_bytes() const noexcept;

@@ -70,6 +70,9 @@ class OccupancyMap {
   [[nodiscard]] virtual double known_volume_m3() const noexcept = 0;
   [[nodiscard]] virtual std::size_t bytes() const noexcept = 0;
   [[nodiscard]] virtual std::uint64_t digest() const noexcept = 0;
+  /// How often space was not taken because the memory is full; never decreases. A map that grows for ever has
+  /// none.
+  [[nodiscard]] virtual std::uint64_t refusals() const noexcept { return 0; }
 };
 
 }  // namespace roborun::stages

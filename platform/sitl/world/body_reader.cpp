@@ -5,8 +5,8 @@ namespace {
 
 constexpr std::size_t kMost = 1000;
 
-double number_within(const TomlReader& reader, const toml::table& table, const char* key, double fallback,
-                     double high) {
+double number_within(const input::TomlReader& reader, const toml::table& table, const char* key,
+                     double fallback, double high) {
   const double value = reader.number_or(table, key, fallback);
   if (!(value >= 0.0 && value <= high))
     reader.refuse(*table.get(key), key, fmt::format("must be a number from 0 to {}", high));
@@ -15,7 +15,7 @@ double number_within(const TomlReader& reader, const toml::table& table, const c
 
 }  // namespace
 
-std::vector<Body> read_bodies(const TomlReader& reader, const toml::table& root) {
+std::vector<Body> read_bodies(const input::TomlReader& reader, const toml::table& root) {
   std::vector<Body> bodies;
   const toml::node* list = root.get("body");
   if (list == nullptr) return bodies;

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "platform/sitl/world/toml_reader.hpp"
+#include "platform/input/toml_reader.hpp"
 #include "platform/sitl/world/world.hpp"
 
 namespace roborun::sitl {
@@ -12,6 +12,6 @@ namespace roborun::sitl {
 /// upright cylinder of this height; a sphere if left out), speed (0 .. 50, m/s; 0 if left out) and at_s (it
 /// waits at the first point until then, 0); metres, at most 1,000 bodies and 1,000 points each. Throws
 /// InputError with file, line, key and what would be right.
-[[nodiscard]] std::vector<Body> read_bodies(const TomlReader& reader, const toml::table& root);
+[[nodiscard]] std::vector<Body> read_bodies(const input::TomlReader& reader, const toml::table& root);
 
 }  // namespace roborun::sitl

@@ -7,7 +7,7 @@
 
 #include "core/geometry/math.hpp"
 #include "core/random/counter_rng.hpp"
-#include "platform/sitl/world/input_error.hpp"
+#include "platform/input/input_error.hpp"
 
 namespace roborun::sitl {
 namespace {
@@ -41,6 +41,13 @@ double probability(const EnvironmentKnobs& k, double density_ratio, double dista
 }
 
 }  // namespace
+
+Mission mission_of(const std::string& name) {
+  if (name == "package_delivery") return Mission::kPackageDelivery;
+  if (name == "search_and_rescue") return Mission::kSearchAndRescue;
+  throw InputError(
+      fmt::format("--mission: unknown mission '{}': must be package_delivery or search_and_rescue", name));
+}
 
 World generate(const EnvironmentKnobs& knobs, Mission mission, std::uint64_t seed) {
   check(knobs);

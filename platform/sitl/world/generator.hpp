@@ -21,6 +21,9 @@ enum class Distribution : std::uint8_t {
 /// probability of a pillar.
 enum class Mission : std::uint8_t { kPackageDelivery, kSearchAndRescue };
 
+/// "package_delivery" or "search_and_rescue". Throws InputError for anything else.
+[[nodiscard]] Mission mission_of(const std::string& name);
+
 struct EnvironmentKnobs {
   double density_ratio{0.45};         ///< [0, 1]. Probability of an obstacle at a centroid.
   double spread_m{80.0};              ///< (0, 1000]. Radius around a centroid within which obstacles stand.

@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "platform/sitl/world/input_error.hpp"
+#include "platform/input/input_error.hpp"
 #include "platform/sitl/world/world_file.hpp"
 
 namespace roborun::sitl {

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <limits>
 
-#include "platform/sitl/world/input_error.hpp"
+#include "platform/input/input_error.hpp"
 #include "platform/sitl/world/octomap_file.hpp"
 
 namespace roborun::sitl {

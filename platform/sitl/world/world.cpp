@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
-#include "platform/sitl/world/input_error.hpp"
+#include "platform/input/input_error.hpp"
 
 namespace roborun::sitl {
 namespace {

@@ -9,10 +9,10 @@
 #include <string_view>
 #include <vector>
 
+#include "platform/input/input_error.hpp"
+#include "platform/input/toml_reader.hpp"
 #include "platform/sitl/world/body_reader.hpp"
-#include "platform/sitl/world/input_error.hpp"
 #include "platform/sitl/world/octomap_file.hpp"
-#include "platform/sitl/world/toml_reader.hpp"
 
 namespace roborun::sitl {
 namespace {
@@ -36,7 +36,7 @@ std::vector<unsigned char> read_file(const std::string& path) {
   return bytes;
 }
 
-void read_pillars(const TomlReader& reader, const toml::table& root, WorldDescription& world) {
+void read_pillars(const input::TomlReader& reader, const toml::table& root, WorldDescription& world) {
   const toml::node* list = root.get("pillar");
   if (list == nullptr) return;
   if (list->as_array() == nullptr) reader.refuse(*list, "pillar", "must be written as [[pillar]]");
@@ -57,7 +57,7 @@ void read_pillars(const TomlReader& reader, const toml::table& root, WorldDescri
   }
 }
 
-void read_boxes(const TomlReader& reader, const toml::table& root, WorldDescription& world) {
+void read_boxes(const input::TomlReader& reader, const toml::table& root, WorldDescription& world) {
   const toml::node* list = root.get("box");
   if (list == nullptr) return;
   if (list->as_array() == nullptr) reader.refuse(*list, "box", "must be written as [[box]]");
@@ -75,8 +75,9 @@ void read_boxes(const TomlReader& reader, const toml::table& root, WorldDescript
 
 WorldDescription read_toml(const std::string& path, const std::vector<unsigned char>& bytes,
                            const Endpoints& endpoints) {
-  const toml::table root = parse_toml(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-  const TomlReader reader(path);
+  const toml::table root =
+      input::parse_toml(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  const input::TomlReader reader(path);
   reader.allow_keys(root, "the file", {"world", "pillar", "box", "body"});
   const toml::table* table = reader.need(root, "world", "the file").as_table();
   if (table == nullptr) reader.refuse(root, "world", "must be a table: [world]");

@@ -5,8 +5,9 @@
 #include <fstream>
 #include <iterator>
 
+#include "platform/input/input_error.hpp"
+#include "platform/input/text_file.hpp"
 #include "platform/report/trace_csv.hpp"
-#include "platform/sitl/world/input_error.hpp"
 #include "tests/platform/report/sample.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -26,7 +27,7 @@ std::string trace() {
   }
   missions[0].decisions[7].missed = true;
   const std::string path = test::scratch("explain.csv");
-  EXPECT_EQ(report::write_trace_csv(path, missions), "");
+  EXPECT_EQ(input::write_file(path, report::trace_csv(missions)), "");
   std::ifstream file(path);
   return {std::istreambuf_iterator<char>(file), {}};
 }
@@ -48,7 +49,7 @@ TEST(Explain, RefusesATimeOutsideAnUnknownDesignAndAnotherFile) {
   const auto complaint = [](const std::string& csv, double at_s, const std::string& design) -> std::string {
     try {
       return explain_decision("t.csv", csv, at_s, design);
-    } catch (const sitl::InputError& error) {
+    } catch (const InputError& error) {
       return error.what();
     }
   };

@@ -9,7 +9,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "platform/sitl/world/input_error.hpp"
+#include "platform/input/input_error.hpp"
 #include "tests/platform/report/xml.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -109,11 +109,11 @@ TEST(MapCommand, ViewDrawsThreePanels) {
 TEST(MapCommand, RefusesWhatIsNoMap) {
   const std::string file = write_room("good.bt", false), bad = test::scratch("bad.bt");
   std::ofstream(bad) << content(file).substr(0, content(file).size() / 2);
-  EXPECT_THROW(map_command("info " + bad), sitl::InputError) << "truncated";
-  EXPECT_THROW(map_command("info " + test::scratch("none.bt")), sitl::InputError);
-  EXPECT_THROW(map_command("convert " + file + " " + test::scratch("map.txt")), sitl::InputError);
-  EXPECT_THROW(map_command("convert " + file + " " + test::scratch("no/folder.bt")), sitl::InputError);
-  EXPECT_THROW(map_command("view " + file + " --height 9"), sitl::InputError) << "above the map";
+  EXPECT_THROW(map_command("info " + bad), InputError) << "truncated";
+  EXPECT_THROW(map_command("info " + test::scratch("none.bt")), InputError);
+  EXPECT_THROW(map_command("convert " + file + " " + test::scratch("map.txt")), InputError);
+  EXPECT_THROW(map_command("convert " + file + " " + test::scratch("no/folder.bt")), InputError);
+  EXPECT_THROW(map_command("view " + file + " --height 9"), InputError) << "above the map";
 }
 
 }  // namespace

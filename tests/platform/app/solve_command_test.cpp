@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "platform/sitl/world/input_error.hpp"
+#include "platform/input/input_error.hpp"
 
 namespace roborun::app {
 namespace {
@@ -59,7 +59,7 @@ TEST(Solve, RefusesWithTheNumberOfTheProblemTheKeyAndWhatWouldBeRight) {
   const auto complaint = [](const std::string& text) -> std::string {
     try {
       return "took it: " + solve_json(text);
-    } catch (const sitl::InputError& error) {
+    } catch (const InputError& error) {
       return error.what();
     }
   };

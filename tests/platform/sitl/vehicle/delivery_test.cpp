@@ -27,9 +27,7 @@ class Delivery final : public firmware_if::Motors {
  public:
   explicit Delivery(std::uint64_t seed) : vehicle_({}, {}, Vector3::Zero(), seed), sensors_({}, seed) {
     kill_closed_.drive(true, {});
-    lane_.set_take_off([](const Vector3& ground_W, MonotonicTime start) {
-      return straight(ground_W, ground_W + Vector3(0.0, 0.0, kClimb_m), 1.5, start);
-    });
+    lane_.set_cruise_height(5.0);
   }
   [[nodiscard]] Status command(const firmware_if::MotorCommand& command) noexcept override {
     thrust_ratio_ = command.thrust_ratio;
@@ -83,7 +81,7 @@ class Delivery final : public firmware_if::Motors {
   MonotonicTime now_{};
   sitl::Vehicle vehicle_;
   sitl::NavigationSensors sensors_;
-  app::FlightLane lane_{{}, {}};
+  flight::FlightControl lane_{{}, {}};
   sitl::FakeCan bus_{1'000'000, 3};
   sitl::FakeCanPort& port_ = bus_.port(0);
   firmware_if::TransmitGate gate_{{}, port_};

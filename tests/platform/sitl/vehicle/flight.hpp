@@ -1,7 +1,7 @@
 /// Estimator, tracker, simulated sensors and vehicle in a closed loop, without decisions.
 #pragma once
 
-#include "platform/app/flight_lane.hpp"
+#include "platform/flight/flight_control.hpp"
 #include "platform/sitl/sensors/navigation_sensors.hpp"
 #include "platform/sitl/vehicle/vehicle.hpp"
 #include "stages/planning/smoother.hpp"
@@ -22,9 +22,7 @@ class Flight {
   static constexpr Nanos kFrame{2'500'000};
   explicit Flight(std::uint64_t seed, const sitl::WindConfig& wind = {})
       : vehicle_({}, wind, Vector3::Zero(), seed), sensors_({}, seed), lane_({}, {}) {
-    lane_.set_take_off([](const Vector3& ground_W, MonotonicTime start) {
-      return straight(ground_W, ground_W + Vector3(0.0, 0.0, 5.0), 1.5, start);
-    });
+    lane_.set_cruise_height(5.0);
     while (!lane_.airborne()) step();
   }
   void step() {
@@ -34,14 +32,14 @@ class Flight {
     vehicle_.step(kFrame);
   }
   [[nodiscard]] MonotonicTime now() const { return now_; }
-  [[nodiscard]] app::FlightLane& lane() { return lane_; }
+  [[nodiscard]] flight::FlightControl& lane() { return lane_; }
   [[nodiscard]] const sitl::VehicleState& truth() const { return vehicle_.state(); }
 
  private:
   MonotonicTime now_{};
   sitl::Vehicle vehicle_;
   sitl::NavigationSensors sensors_;
-  app::FlightLane lane_;
+  flight::FlightControl lane_;
 };
 
 }  // namespace roborun::test

@@ -5,7 +5,7 @@
 #include <array>
 
 #include "governor/models/stopping_model.hpp"
-#include "platform/app/stopping_sweep.hpp"
+#include "platform/board/stopping_sweep.hpp"
 
 namespace roborun::app {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 constexpr std::array<double, 7> kSpeeds_mps{0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
 
 TEST(Stopping, TheModelIsNeverShorterThanTheVehicleAndAtMostTwiceAsLong) {
-  for (const StoppingPoint& p : stopping_sweep(kSpeeds_mps, 4, {})) {
+  for (const board::StoppingPoint& p : board::stopping_sweep(kSpeeds_mps, 4, {})) {
     const double model_m = governor::kSitlQuadrotorStopping.distance_m(p.speed_mps);
     EXPECT_GT(p.distance_m, 0.0);
     EXPECT_GE(model_m, p.distance_m) << p.speed_mps << " m/s";
@@ -22,7 +22,7 @@ TEST(Stopping, TheModelIsNeverShorterThanTheVehicleAndAtMostTwiceAsLong) {
 }
 
 TEST(Stopping, AFitIsWithinTwoPercent) {
-  const StoppingFit fit = fit_stopping(stopping_sweep(kSpeeds_mps, 2, {}));
+  const board::StoppingFit fit = board::fit_stopping(board::stopping_sweep(kSpeeds_mps, 2, {}));
   EXPECT_LT(fit.mean_squared_relative, 0.02);
   EXPECT_GT(fit.model.quadratic_s2pm, 0.0);
 }

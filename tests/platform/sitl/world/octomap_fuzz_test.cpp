@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/random/counter_rng.hpp"
-#include "platform/sitl/world/input_error.hpp"
+#include "platform/input/input_error.hpp"
 #include "platform/sitl/world/octomap_file.hpp"
 
 namespace roborun::sitl {

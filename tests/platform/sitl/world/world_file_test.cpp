@@ -6,7 +6,7 @@
 #include <fstream>
 #include <string>
 
-#include "platform/sitl/world/input_error.hpp"
+#include "platform/input/input_error.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace roborun::sitl {

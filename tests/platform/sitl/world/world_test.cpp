@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "core/random/counter_rng.hpp"
-#include "platform/sitl/world/input_error.hpp"
+#include "platform/input/input_error.hpp"
 
 namespace roborun::sitl {
 namespace {

@@ -1,0 +1,95 @@
+/// The vehicle: its body, its propulsion, its limits. The only place where they are written down; whatever
+/// needs one of these numbers is made from this struct. One table names, bounds and explains every number: it
+/// drives the reader of vehicle files, the check, and the reference.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "core/geometry/vector.hpp"
+
+namespace roborun {
+
+/// A quadrotor in X. Defaults: the vehicle of the paper's evaluation, 1.2 m wide (RoboRun: 1.2 m vehicle in a
+/// 1.8 m aisle), which hovers at about 515 W.
+struct VehicleModel {
+  double radius_m{0.6};
+  double tracking_error_m{0.3};  ///< Measured in tests/platform/sitl/vehicle/closed_loop_test.cpp.
+  double mass_kg{4.5};
+  double inertia_x_kgm2{0.080};
+  double inertia_y_kgm2{0.080};
+  double inertia_z_kgm2{0.140};
+  double arm_m{0.30};
+
+  double max_thrust_N{24.5};  ///< Thrust to weight 2.2.
+  double yaw_torque_m{0.018};
+  double motor_lag_s{0.040};  ///< 15 inch propeller on an ESC with closed-loop speed.
+  double rotor_radius_m{0.19};
+  double efficiency_ratio{0.54};
+
+  double drag_linear_Nspm{0.30};
+  double drag_quadratic_Ns2pm2{0.055};  ///< 0.5 * 1.225 kg/m3 * 0.09 m2.
+  double drag_angular_Nms{0.02};
+
+  double avionics_W{15.0};
+  double battery_J{2.2e6};  ///< 611 Wh: the longest mission of the static design, 1,200 m at 0.5 m/s.
+
+  double speed_mps{6.0};  ///< RoboRun Table "Knob values".
+  double acceleration_mps2{4.0};
+  double jerk_mps3{20.0};  ///< On short hops the tilt overshot by 6 degrees without it.
+  double tilt_rad{0.60};   ///< 34 degrees: 6.7 m/s2 sideways.
+
+  [[nodiscard]] Vector3 inertia_kgm2() const noexcept {
+    return {inertia_x_kgm2, inertia_y_kgm2, inertia_z_kgm2};
+  }
+};
+
+/// One number of a vehicle file.
+struct VehicleKey {
+  const char* table;
+  const char* key;  ///< With its unit.
+  double VehicleModel::*value;
+  double low, high;  ///< Both allowed.
+  const char* text;
+};
+
+// clang-format off
+inline constexpr std::array<VehicleKey, 21> kVehicleKeys = [] {
+  using V = VehicleModel;
+  return std::array<VehicleKey, 21>{{
+    {"body", "radius_m", &V::radius_m, 0.05, 5.0, "of the sphere around everything that must not touch, propellers included"},
+    {"body", "tracking_error_m", &V::tracking_error_m, 0.02, 2.0, "largest distance from the reference in flight: added to the radius for planning"},
+    {"body", "mass_kg", &V::mass_kg, 0.05, 100.0, "at take-off, load included"},
+    {"body", "inertia_x_kgm2", &V::inertia_x_kgm2, 1e-6, 100.0, "about the forward axis"},
+    {"body", "inertia_y_kgm2", &V::inertia_y_kgm2, 1e-6, 100.0, "about the left axis"},
+    {"body", "inertia_z_kgm2", &V::inertia_z_kgm2, 1e-6, 100.0, "about the upward axis"},
+    {"body", "arm_m", &V::arm_m, 0.02, 3.0, "offset of a motor from the centre, forward and to the side alike"},
+    {"propulsion", "max_thrust_N", &V::max_thrust_N, 0.1, 1000.0, "of one motor of the four"},
+    {"propulsion", "yaw_torque_m", &V::yaw_torque_m, 1e-4, 0.5, "reaction torque per newton of thrust"},
+    {"propulsion", "motor_lag_s", &V::motor_lag_s, 0.005, 0.5, "time constant of a motor's thrust"},
+    {"propulsion", "rotor_radius_m", &V::rotor_radius_m, 0.01, 2.0, "of one propeller: what hovering costs"},
+    {"propulsion", "efficiency_ratio", &V::efficiency_ratio, 0.05, 1.0, "figure of merit times motor and ESC"},
+    {"drag", "linear_Nspm", &V::drag_linear_Nspm, 0.0, 20.0, "rotor drag per m/s of air speed"},
+    {"drag", "quadratic_Ns2pm2", &V::drag_quadratic_Ns2pm2, 0.0, 5.0, "body drag per (m/s)2: half of density times area"},
+    {"drag", "angular_Nms", &V::drag_angular_Nms, 0.0, 5.0, "torque per rad/s of rotation"},
+    {"power", "avionics_W", &V::avionics_W, 0.0, 2000.0, "companion computer, sensors, autopilot"},
+    {"power", "battery_J", &V::battery_J, 1e3, 1e9, "usable energy of a full battery"},
+    {"limits", "speed_mps", &V::speed_mps, 0.5, 30.0, "fastest flight of the design aware"},
+    {"limits", "acceleration_mps2", &V::acceleration_mps2, 0.2, 30.0, "along a whole trajectory, braking included"},
+    {"limits", "jerk_mps3", &V::jerk_mps3, 1.0, 1000.0, "along a whole trajectory"},
+    {"limits", "tilt_rad", &V::tilt_rad, 0.05, 1.2, "of the thrust against the vertical"},
+  }};
+}();
+// clang-format on
+
+/// The first number that is not within its bounds (NaN never is), or null: all are.
+[[nodiscard]] constexpr const VehicleKey* out_of_bounds(const VehicleModel& vehicle) noexcept {
+  for (const VehicleKey& key : kVehicleKeys) {
+    const double value = vehicle.*key.value;
+    if (!(value >= key.low && value <= key.high)) return &key;
+  }
+  return nullptr;
+}
+
+}  // namespace roborun

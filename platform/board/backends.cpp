@@ -1,0 +1,58 @@
+#include "platform/board/backends.hpp"
+
+#include <fmt/format.h>
+
+#include "platform/input/input_error.hpp"
+#include "stages/perception/brick_map.hpp"
+#include "stages/perception/octomap_backend/octomap_backend.hpp"
+#include "stages/planning/ompl_backend/ompl_backend.hpp"
+#include "stages/planning/rrt_star.hpp"
+
+namespace roborun::board {
+namespace {
+
+stages::BrickMap::Config brick_config(const Aabb& map_bounds_W, const ImageLimits& images) {
+  stages::BrickMap::Config config;
+  config.bounds_W = map_bounds_W;
+  config.max_image_side = images.side_pixels;
+  if (config.validate() != Status::kOk) {
+    throw InputError("map: the world is too large for the map: at most 4 million bricks of 4.8 m");
+  }
+  return config;
+}
+
+std::unique_ptr<stages::OccupancyMap> make_map(const std::string& name, const Aabb& bounds_W,
+                                               const ImageLimits& images, core::Arena& arena) {
+  if (name == "own") return std::make_unique<stages::BrickMap>(brick_config(bounds_W, images), arena);
+  if (name == "octomap") return stages::make_octomap_backend({bounds_W, images.range_m + 5.0});
+  throw InputError(fmt::format("unknown map '{}': must be own or octomap", name));
+}
+
+std::unique_ptr<stages::Planner> make_planner(const std::string& name, core::Arena& arena) {
+  if (name == "own") return std::make_unique<stages::RrtStar>(stages::RrtStar::Config{}, arena);
+  std::unique_ptr<stages::Planner> planner;
+  if (name.rfind("ompl:", 0) == 0) planner = stages::make_ompl_planner(name.substr(5), {});
+  if (planner == nullptr) {
+    throw InputError(fmt::format(
+        "unknown planner '{}': must be own or ompl:NAME, NAME one of OMPL's geometric planners (RRTstar, "
+        "InformedRRTstar, BITstar, ABITstar, AITstar, RRTConnect, PRMstar, FMT, ...)",
+        name));
+  }
+  return planner;
+}
+
+}  // namespace
+
+std::size_t backend_bytes(const Aabb& map_bounds_W, const ImageLimits& images) {
+  return stages::BrickMap::arena_bytes(brick_config(map_bounds_W, images)) +
+         stages::RrtStar::arena_bytes({}) + 4096;
+}
+
+MapAndPlanner make_backends(const BackendNames& names, const Aabb& map_bounds_W, const ImageLimits& images,
+                            core::Arena& arena) {
+  MapAndPlanner result{make_map(names.map, map_bounds_W, images, arena), make_planner(names.planner, arena)};
+  if (result.map == nullptr) throw InputError("map: not enough memory");
+  return result;
+}
+
+}  // namespace roborun::board

@@ -1,0 +1,39 @@
+/// Maps and planners by name: any design flies with any of them.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "core/geometry/vector.hpp"
+#include "core/memory/arena.hpp"
+#include "stages/perception/occupancy_map.hpp"
+#include "stages/planning/planner.hpp"
+
+namespace roborun::board {
+
+/// Which map and planner: "own" or "octomap", "own" or "ompl:NAME".
+struct BackendNames {
+  std::string map{"own"};
+  std::string planner{"own"};
+  friend bool operator==(const BackendNames&, const BackendNames&) = default;
+};
+
+/// What the map must be able to take.
+struct ImageLimits {
+  std::uint16_t side_pixels{};  ///< The longer side of the largest image.
+  double range_m{};             ///< The farthest that a camera sees.
+};
+
+struct MapAndPlanner {
+  std::unique_ptr<stages::OccupancyMap> map;
+  std::unique_ptr<stages::Planner> planner;
+};
+
+/// Bytes that the own backends take from the arena.
+[[nodiscard]] std::size_t backend_bytes(const Aabb& map_bounds_W, const ImageLimits& images);
+/// Throws InputError for unknown names, and for a world that the map cannot hold.
+[[nodiscard]] MapAndPlanner make_backends(const BackendNames& names, const Aabb& map_bounds_W,
+                                          const ImageLimits& images, core::Arena& arena);
+
+}  // namespace roborun::board

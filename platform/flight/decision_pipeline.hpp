@@ -1,0 +1,135 @@
+/// One decision: depth images in, a committed trajectory out. The only place where governor and stages meet.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "core/executive/frame_table.hpp"
+#include "core/executive/stage_budget.hpp"
+#include "core/executive/stage_meter.hpp"
+#include "core/geometry/fence.hpp"
+#include "core/geometry/vector.hpp"
+#include "core/trajectory.hpp"
+#include "governor/policy/governor.hpp"
+#include "stages/perception/occupancy_map.hpp"
+#include "stages/perception/point_cloud.hpp"
+#include "stages/perception/space_profiler.hpp"
+#include "stages/planning/planner.hpp"
+#include "stages/planning/smoother.hpp"
+
+namespace roborun::flight {
+
+struct PipelineConfig {
+  Aabb flight_bounds_W{};        ///< The vehicle's centre stays inside.
+  double vehicle_radius_m{0.6};  ///< Half of the 1.2 m span. [0.1, 2]
+  /// Added to the radius for planning: the tracking error (tests/platform/sitl/vehicle/closed_loop_test.cpp).
+  double inflation_m{0.3};
+  std::size_t cameras{6};  ///< What fewer images do not show may be anything.
+  double horizon_m{24.0};  ///< No way-point farther than this: one metre less than the cameras see.
+  double acceleration_mps2{4.0};
+  core::Fence fence{};                   ///< What it forbids is occupied for planner and smoother.
+  Nanos minor_frame{core::kMinorFrame};  ///< Of the flight lane: no stop takes over sooner.
+  Aabb map_bounds_W{};  ///< What the map stores; its heights limit what counts as seen volume.
+};
+
+struct DecisionInput {
+  MonotonicTime now{};  ///< Start of the decision.
+  std::span<const stages::PosedDepthFrame> frames{};
+  const Trajectory* committed{};  ///< What the flight lane flies now.
+  bool climbing{false};           ///< To the first hover: looks around as precisely as it can.
+  Vector3 p_WB = Vector3::Zero();
+  Vector3 v_WB = Vector3::Zero();
+  Vector3 goal_W = Vector3::Zero();
+  std::uint64_t seed{};
+};
+
+/// What the flight lane is to do with the result.
+enum class DecisionKind : std::uint8_t {
+  kKeep,   ///< Nothing better: fly on, the committed trajectory ends in a stop.
+  kNew,    ///< `trajectory` takes over at its start time.
+  kBrake,  ///< The committed trajectory is no longer free: `trajectory` is the stop. Also after the map.
+};
+
+struct DecisionOutput {
+  DecisionKind kind{DecisionKind::kKeep};
+  Trajectory trajectory{};
+  Status planner_status{Status::kNotReady};
+  Status smoother_status{Status::kNotReady};
+  bool planned_to_goal{};  ///< The path ends at the goal of the mission.
+  SpaceProfile profile{};
+  governor::Decision decision{};
+  std::array<core::Work, core::kStageCount> work{};
+  std::array<Nanos, core::kStageCount> cost{};
+  bool motion{};    ///< Something was seen to move nearby, not long ago.
+  Nanos latency{};  ///< Sum of the costs: when the result is there, counted from input.now.
+};
+
+/// Runs the stages in the order of the frame table, each under the budget that the governor granted it.
+/// Memory: everything is taken from the arena at construction. One thread.
+class DecisionPipeline {
+ public:
+  /// The map and the planner are given from outside, so that any backend flies with any design.
+  DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter, governor::Governor& governor,
+                   stages::PointCloud& cloud, stages::OccupancyMap& map, stages::Planner& planner,
+                   stages::Smoother& smoother) noexcept;
+
+  /// One stage of a decision; all of them in order make one. `out` is begun by the first (kPointCloud). The
+  /// smoother alternates with the planner in the planner's turn, each charged for its own, and has no turn.
+  /// After kMap `out.kind` may be kBrake: what is flown is blocked in the newest map, and the rest of the
+  /// decision would be too long to wait. Whoever flies the stop then gives it as in.committed to the stages
+  /// that follow, and takes kind back to kKeep.
+  /// RT-safe: no allocation; bounded by the stages' budgets.
+  void run(core::StageId id, const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// Of the map, as the planner sees it but for the fence.
+  [[nodiscard]] const stages::MapView& view() const noexcept { return map_.view(); }
+  [[nodiscard]] const stages::OccupancyMap& map() const noexcept { return map_; }
+  /// What plans keep free around the vehicle.
+  [[nodiscard]] double radius_m() const noexcept { return config_.vehicle_radius_m + config_.inflation_m; }
+
+ private:
+  /// Where something was seen to move, a ring.
+  struct Trace {
+    Vector3 p_W = Vector3::Zero();
+    MonotonicTime until{};
+  };
+  static constexpr std::size_t kTraces = 64;
+
+  void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
+  void perceive(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// Notes surfaces near the vehicle where the map, before it gets these images, knows free space. Not behind
+  /// it: who is followed must not slow down.
+  void sense_motion(const DecisionInput& in, const Aabb& relevant_W, core::StageBudget& budget,
+                    core::Work& work) noexcept;
+  /// The plan before: straight towards the goal, for most of what can be seen.
+  [[nodiscard]] bool went_straight(const DecisionInput& in) const noexcept;
+  void govern(const DecisionInput& in, DecisionOutput& out) noexcept;
+  void integrate(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// What is flown, on the map that just got its images.
+  void check_committed(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// The stop that takes over as soon as it can, if it stays free until `free_until` at least: a straight
+  /// stop out of a descent meets the ground sooner than what it replaces.
+  void offer_stop(const DecisionInput& in, MonotonicTime free_until, const stages::MapView& known,
+                  core::Work& work, DecisionOutput& out) noexcept;
+  void export_map(const DecisionInput& in, DecisionOutput& out) noexcept;
+  void plan(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// What is left of the deadline for this stage, when the stages after it get what was predicted for them.
+  [[nodiscard]] core::MeteredBudget budget_of(core::StageId id, const DecisionOutput& out) noexcept;
+  /// For the stages that the governor does not shape: the frame table's.
+  [[nodiscard]] core::MeteredBudget table_budget_of(core::StageId id) noexcept;
+
+  PipelineConfig config_;
+  core::StageMeter& meter_;
+  governor::Governor& governor_;
+  stages::PointCloud& cloud_;
+  stages::OccupancyMap& map_;
+  stages::Planner& planner_;
+  stages::Smoother& smoother_;
+  stages::Path kept_W_;  ///< What was planned last.
+  MonotonicTime motion_until_{};
+  std::array<Trace, kTraces> trace_{};
+  std::size_t next_trace_{0};
+  int failures_{0};  ///< Decisions in a row without a trajectory.
+};
+
+}  // namespace roborun::flight

@@ -1,0 +1,153 @@
+#include "platform/flight/decision_program.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/geometry/camera_pose.hpp"
+#include "core/random/counter_rng.hpp"
+#include "core/record/state_hash.hpp"
+#include "platform/flight/landing_site.hpp"
+
+namespace roborun::flight {
+
+using core::SlotId;
+using governor::Action;
+
+namespace {
+
+constexpr int kReportDelay = 4;            // minor frames at most, from a commit to its report
+constexpr Nanos kIdlePeriod{100'000'000};  // of reports while there is nothing to decide
+constexpr Nanos kLatestStop{20'000'000};   // 12 cm at 6 m/s
+
+}  // namespace
+
+bool DecisionProgram::is_usable(std::size_t camera, const firmware_if::DepthFrame& frame) noexcept {
+  constexpr int kEnough = 16;
+  core::StateHash hash;
+  std::size_t surfaces = 0;
+  std::size_t valid = 0;
+  for (const float depth_m : frame.depth_m) {
+    if (!(depth_m > 0.0F)) continue;
+    ++valid;
+    if (!std::isfinite(depth_m)) continue;
+    ++surfaces;
+    hash.add(static_cast<double>(depth_m));
+  }
+  // The open sky is the same in every image.
+  const bool stuck = surfaces >= kEnough && hash.value() == image_digest_[camera];
+  image_digest_[camera] = hash.value();
+  return !stuck && 5 * valid >= frame.depth_m.size();
+}
+
+void DecisionProgram::publish(MonotonicTime due) noexcept {
+  report_.heard = true;
+  report_.due = due;
+  mail_.decision.draft() = report_;
+  mail_.decision.publish();
+}
+
+void DecisionProgram::choose_site() noexcept {
+  const FlightReport& report = mail_.report.read();
+  if (report.action != Action::kLand || !report.standing || report_.site_known) return;
+  const auto site_W =
+      landing_site_W(pipeline_.view(), config_.fence, in_.p_WB, report.ground_m, pipeline_.radius_m());
+  report_.site_known = site_W.has_value();
+  if (site_W) report_.site_W = *site_W;
+}
+
+void DecisionProgram::judge() noexcept {
+  const bool answer = out_.planner_status == Status::kNoPath || out_.planner_status == Status::kGoalBlocked;
+  // On the way home even "no way" is a failure: nothing else will bring it down.
+  const bool fine = out_.smoother_status == Status::kOk || report_.site_known || in_.climbing ||
+                    (answer && mail_.report.read().action != Action::kReturn);
+  report_.failures = fine ? 0 : report_.failures + 1;
+  const std::uint64_t refusals = pipeline_.map().refusals();
+  report_.map_refusals = refusals > refusals_before_ ? report_.map_refusals + 1 : 0;
+  refusals_before_ = refusals;
+}
+
+void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
+  (void)mail_.report.take();
+  const FlightReport& report = mail_.report.read();
+  const stages::EstimatedState& state = report.state;
+  if (given_up_.load(std::memory_order_acquire) || !report.flying || !report.estimated) {
+    // Nobody waits for it: decisions have not begun, or are over.
+    last_usable_.fill(lane.release());
+    publish(lane.release() + kIdlePeriod);
+    lane.end_frame();
+    return;
+  }
+  frames_.clear();
+  report_.depth_age_s = 0.0;
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    stages::PosedDepthFrame posed;
+    Pose X_WB;
+    if (cameras_[i]->read(posed.frame) == Status::kOk && is_usable(i, posed.frame) &&
+        report.past.pose_at(posed.frame.stamp, X_WB) == Status::kOk) {
+      posed.X_WC = core::camera_pose(X_WB, cameras_[i]->mount());
+      (void)frames_.push_back(posed);
+      last_usable_[i] = posed.frame.stamp;
+    }
+    report_.depth_age_s = std::max(report_.depth_age_s, seconds(lane.release() - last_usable_[i]));
+  }
+  publish(lane.release() + kIdlePeriod);
+  if (frames_.empty()) {
+    lane.set_period(4 * core::kMinorFrame);
+    lane.end_frame();
+    return;
+  }
+  in_.now = lane.release();
+  in_.frames = {frames_.begin(), frames_.size()};
+  in_.committed = &flown(lane.release());
+  in_.climbing = !report.airborne;
+  in_.p_WB = state.p_WB;
+  in_.v_WB = state.v_WB;
+  in_.goal_W = report.action == Action::kReturn ? report.home_W
+               : report.action == Action::kLand ? state.p_WB  // close looks, slow
+                                                : config_.goal_W;
+  in_.seed = core::mix64(config_.seed * 1000003ULL + ++decisions_);
+}
+
+const Trajectory& DecisionProgram::flown(MonotonicTime now) const noexcept {
+  const Trajectory& reported = mail_.report.read().committed;
+  const bool newer = handed_over_.start_time > reported.start_time && handed_over_.start_time <= now &&
+                     now - handed_over_.start_time <= kReportDelay * config_.minor_frame;
+  return newer ? handed_over_ : reported;
+}
+
+bool DecisionProgram::hand_over(const core::LaneExecutive& lane) noexcept {
+  if (out_.kind == DecisionKind::kKeep) return false;
+  // Too late for its own start: the vehicle already flies its braking tail, and the result is of no use. A
+  // stop is still better a little late; after a stall it would begin where the vehicle is no more.
+  const Nanos latest = out_.kind == DecisionKind::kNew ? Nanos{0} : kLatestStop;
+  if (out_.trajectory.start_time + latest < lane.now()) {
+    ++too_late_;
+    return false;
+  }
+  handed_over_ = out_.trajectory;
+  mail_.offer.draft() = {out_.trajectory, out_.kind == DecisionKind::kBrake};
+  mail_.offer.publish();
+  return true;
+}
+
+void DecisionProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
+  if (slot == SlotId::kGather) return gather(lane);
+  if (slot == SlotId::kHandOver) return (void)hand_over(lane);
+  const auto stage =
+      static_cast<core::StageId>(static_cast<int>(slot) - static_cast<int>(SlotId::kPointCloud));
+  if (slot == SlotId::kPlanner) {
+    choose_site();
+    if (report_.site_known) in_.goal_W = report_.site_W;
+  }
+  pipeline_.run(stage, in_, out_);
+  if (slot == SlotId::kMap && out_.kind == DecisionKind::kBrake) {
+    if (hand_over(lane)) in_.committed = &handed_over_;
+    out_.kind = DecisionKind::kKeep;
+  }
+  if (slot == SlotId::kPlanner) judge();
+  if (slot == SlotId::kGovernor || slot == SlotId::kPlanner)
+    publish(lane.release() + out_.decision.point.deadline);
+  if (slot == SlotId::kGovernor) lane.set_period(out_.decision.point.deadline);
+}
+
+}  // namespace roborun::flight

@@ -1,0 +1,74 @@
+/// What runs in the slots of the decision lane, whether time is real or virtual.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <span>
+
+#include "core/executive/frame_table.hpp"
+#include "core/executive/lane_executive.hpp"
+#include "core/geometry/fence.hpp"
+#include "core/memory/static_vector.hpp"
+#include "firmware_if/depth_camera.hpp"
+#include "platform/flight/decision_pipeline.hpp"
+#include "platform/flight/flight_config.hpp"
+#include "platform/flight/lane_mail.hpp"
+
+namespace roborun::flight {
+
+class DecisionProgram final : public core::LaneProgram {
+ public:
+  struct Config {
+    Vector3 goal_W = Vector3::Zero();
+    std::uint64_t seed{1};
+    core::Fence fence{};
+    Nanos minor_frame{core::kMinorFrame};  ///< Of the flight lane.
+  };
+  DecisionProgram(const Config& config, DecisionPipeline& pipeline,
+                  std::span<firmware_if::DepthCamera* const> cameras, LaneMail& mail) noexcept
+      : config_(config), pipeline_(pipeline), mail_(mail) {
+    for (firmware_if::DepthCamera* camera : cameras) (void)cameras_.push_back(camera);
+  }
+  void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override;
+
+  /// No more decisions from here on; any thread.
+  void give_up() noexcept { given_up_.store(true, std::memory_order_release); }
+  /// The newest decision: complete once the planner's slot has run.
+  [[nodiscard]] const DecisionOutput& output() const noexcept { return out_; }
+  [[nodiscard]] std::uint64_t decisions() const noexcept { return decisions_; }
+  /// Trajectories that came too late for their own start; never decreases.
+  [[nodiscard]] std::uint64_t too_late() const noexcept { return too_late_; }
+
+ private:
+  void gather(core::LaneExecutive& lane) noexcept;
+  /// At least a fifth of its pixels says something, and not all the same as in the image before: a camera
+  /// without noise is stuck.
+  [[nodiscard]] bool is_usable(std::size_t camera, const firmware_if::DepthFrame& frame) noexcept;
+  void publish(MonotonicTime due) noexcept;
+  void choose_site() noexcept;
+  void judge() noexcept;
+  /// False if there is nothing to hand over, or it is too late for it.
+  bool hand_over(const core::LaneExecutive& lane) noexcept;
+  /// What the flight lane flies at `now`. What was handed over counts from its start on: the report of that
+  /// very frame may not be there yet.
+  [[nodiscard]] const Trajectory& flown(MonotonicTime now) const noexcept;
+
+  Config config_;
+  DecisionPipeline& pipeline_;
+  core::StaticVector<firmware_if::DepthCamera*, kMostCameras> cameras_;
+  LaneMail& mail_;
+  core::StaticVector<stages::PosedDepthFrame, kMostCameras> frames_;
+  DecisionInput in_{};
+  DecisionOutput out_{};
+  std::uint64_t decisions_{0};
+  std::uint64_t too_late_{0};
+  std::atomic<bool> given_up_{false};
+  Trajectory handed_over_{};
+  DecisionReport report_{};
+  std::array<MonotonicTime, kMostCameras> last_usable_{};  ///< By camera.
+  std::array<std::uint64_t, kMostCameras> image_digest_{};
+  std::uint64_t refusals_before_{0};
+};
+
+}  // namespace roborun::flight

@@ -1,0 +1,181 @@
+#include "platform/flight/flight_control.hpp"
+
+#include <algorithm>
+
+#include "core/geometry/math.hpp"
+#include "stages/planning/smoother.hpp"
+
+namespace roborun::flight {
+namespace {
+
+constexpr Nanos kSettle{1'000'000'000};     // the filter's biases need a second on the ground
+constexpr Nanos kHover{300'000'000};        // at the top, before the first decision
+constexpr double kGyroRange_radps = 35.0;   // 2,000 degrees a second
+constexpr double kAccelRange_mps2 = 157.0;  // 16 g
+constexpr double kBrake_mps2 = 2.5;         // with the path's own 4 m/s2 still within the tilt limit
+constexpr double kTakeOff_mps = 1.5;
+constexpr double kStand_m = 0.5;
+constexpr double kStand_mps = 0.3;
+constexpr double kNearGround_m = 1.5;  // over the take-off's height: from there on slowly
+constexpr double kTouchdown_mps = 0.5;
+constexpr double kBelowGround_m = 20.0;  // the reference goes on until the vehicle stands on something
+constexpr Nanos kLanded{1'000'000'000};
+
+/// Straight up from the ground to the height of the first hover.
+Trajectory take_off(const Vector3& ground_W, double cruise_m, MonotonicTime start) {
+  Trajectory t;
+  t.start_time = start;
+  (void)stages::append_rest_to_rest(ground_W, Vector3(ground_W.x(), ground_W.y(), cruise_m),
+                                    {kTakeOff_mps, kTakeOff_mps}, t);
+  return t;
+}
+
+/// Within the range of the sensor; false for NaN.
+bool is_plausible(const firmware_if::ImuSample& sample) {
+  const auto within = [](const std::array<double, 3>& v, double limit) {
+    return std::all_of(v.begin(), v.end(), [limit](double x) { return std::fabs(x) <= limit; });
+  };
+  return within(sample.angular_rate_B_radps, kGyroRange_radps) &&
+         within(sample.specific_force_B_mps2, kAccelRange_mps2);
+}
+
+}  // namespace
+
+void FlightControl::sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_if::Barometer& barometer) {
+  // At most a ring's worth a frame, so that a flood of samples cannot hold the lane.
+  constexpr int kMost = 16;
+  firmware_if::ImuSample sample;
+  for (int i = 0; i < kMost && imu.read(sample) == Status::kOk; ++i) {
+    const bool same = sample.angular_rate_B_radps == imu_.angular_rate_B_radps &&
+                      sample.specific_force_B_mps2 == imu_.specific_force_B_mps2;
+    imu_repeats_ = same ? std::min(imu_repeats_ + 1, kMostRepeats) : 0;
+    imu_ = sample;
+    if (is_plausible(sample)) (void)estimator_.predict(sample);
+  }
+  firmware_if::GnssFix fix;
+  for (int i = 0; i < kMost && gnss.read(fix) == Status::kOk; ++i) {
+    const bool differs = fix.p_WB_m != fix_.p_WB_m || fix.v_WB_mps != fix_.v_WB_mps;
+    fix_ = fix;
+    if (estimator_.update(fix) == Status::kOk && differs) last_fix_ = fix.stamp;
+  }
+  firmware_if::BarometerSample pressure;
+  for (int i = 0; i < kMost && barometer.read(pressure) == Status::kOk; ++i)
+    (void)estimator_.update(pressure);
+}
+
+void FlightControl::commit(MonotonicTime now) {
+  stages::EstimatedState state;
+  if (estimator_.state(state) != Status::kOk) return;
+  if (!first_estimate_) {
+    first_estimate_ = now;
+    const Matrix3 R_WB = state.q_WB.toRotationMatrix();
+    yaw_rad_ = core::atan2(R_WB(1, 0), R_WB(0, 0));
+  }
+  if (!flying_) {
+    if (now - *first_estimate_ < kSettle || !may_take_off_) return;
+    committed_ = take_off(state.p_WB, cruise_m_, now);
+    ++committed_number_;
+    flying_ = true;
+    home_W_ = committed_.end_W();
+    ground_m_ = state.p_WB.z();
+  }
+  if (!airborne_ && now > committed_.start_time + from_seconds(committed_.duration_s()) + kHover)
+    airborne_ = true;
+  if (braking_ || descending_) offered_.reset();
+  if (offered_ && offered_->start_time <= now) {
+    committed_ = *offered_;
+    ++committed_number_;
+    offered_.reset();
+  }
+}
+
+void FlightControl::brake() {
+  offered_.reset();
+  if (braking_ || descending_ || !flying_) return;
+  braking_ = true;
+  brake_at_s_ = -1.0;
+  brake_rate_ = 1.0;
+}
+
+bool FlightControl::standing(MonotonicTime now) const {
+  stages::EstimatedState state;
+  return flying_ && !braking_ && now > committed_.start_time + from_seconds(committed_.duration_s()) &&
+         estimator_.state(state) == Status::kOk && state.v_WB.norm() < kStand_mps &&
+         (state.p_WB - reference_.p_W).norm() < kStand_m;
+}
+
+void FlightControl::descend(MonotonicTime now, double speed_mps) {
+  if (descending_ || !flying_) return;
+  const Vector3 from_W = committed_.at(now).p_W;
+  const double fast_m = std::max(from_W.z() - ground_m_ - kNearGround_m, 0.0);
+  const auto straight_down = [](const Vector3& at_W, double length_m, double rate_mps) {
+    PolynomialSegment segment;
+    segment.duration_s = length_m / rate_mps;
+    segment.coefficient[0] = at_W;
+    segment.coefficient[1] = Vector3(0.0, 0.0, -rate_mps);
+    return segment;
+  };
+  Trajectory down;
+  down.start_time = now;
+  down.segment_count = 2;
+  down.segment[0] = straight_down(from_W, fast_m, speed_mps);
+  down.segment[1] =
+      straight_down(from_W - Vector3(0.0, 0.0, fast_m), kNearGround_m + kBelowGround_m, kTouchdown_mps);
+  down.brake_begin_s = down.duration_s();
+  committed_ = down;
+  ++committed_number_;
+  braking_ = false;
+  descending_ = true;
+  moving_ = now;
+}
+
+TrajectoryPoint FlightControl::next_reference(MonotonicTime now) {
+  if (!braking_) return committed_.at(now);
+  // The same curve at a rate that falls to zero: p = c(s), v = c' s', a = c'' s'^2 + c' s''.
+  if (brake_at_s_ < 0.0) brake_at_s_ = seconds(now - committed_.start_time) - period_s_;
+  const double rate = brake_rate_;
+  const double speed_mps = committed_.at_s(brake_at_s_).v_W.norm();
+  brake_rate_ = std::max(rate - period_s_ * kBrake_mps2 / std::max(speed_mps, 1.0), 0.0);
+  brake_at_s_ += period_s_ * brake_rate_;
+  TrajectoryPoint point = committed_.at_s(brake_at_s_);
+  if (brake_rate_ <= 0.0 || brake_at_s_ >= committed_.duration_s()) {
+    committed_ = Trajectory::hold(point.p_W, now);
+    ++committed_number_;
+    braking_ = false;
+    return committed_.at(now);
+  }
+  const double slowing = (brake_rate_ - rate) / period_s_;
+  const double r = brake_rate_;
+  point.j_W = Vector3(r * r * r * point.j_W + 3.0 * r * slowing * point.a_W);
+  point.a_W = Vector3(r * r * point.a_W + slowing * point.v_W);
+  point.v_W *= r;
+  return point;
+}
+
+void FlightControl::watch_touchdown(MonotonicTime now, const stages::EstimatedState& state) {
+  constexpr double kStill_mps = 0.2;
+  constexpr double kBelow_m = 0.3;
+  constexpr double kCarried_ratio = 0.8;
+  double thrust_N = 0.0;
+  const stages::Airframe airframe;
+  for (const double ratio : command_.thrust_ratio) thrust_N += ratio * airframe.max_thrust_N;
+  const bool still = std::fabs(state.v_WB.z()) < kStill_mps;
+  const bool pushed = reference_.p_W.z() < state.p_WB.z() - kBelow_m;
+  const bool carried = thrust_N < kCarried_ratio * airframe.mass_kg * 9.81;
+  if (!(still && pushed && carried)) moving_ = now;
+  landed_ = now - moving_ >= kLanded;
+}
+
+void FlightControl::track(MonotonicTime now, firmware_if::Motors& motors) {
+  stages::Tracker::Input in;
+  if (!flying_ || landed_ || estimator_.state(in.state) != Status::kOk) return;
+  reference_ = next_reference(now);
+  in.reference = reference_;
+  in.yaw_rad = yaw_rad_;
+  // A refused step leaves the command of the frame before.
+  (void)tracker_.step(in, command_);
+  if (descending_) watch_touchdown(now, in.state);
+  if (!landed_) (void)motors.command(command_);
+}
+
+}  // namespace roborun::flight

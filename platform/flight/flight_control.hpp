@@ -1,0 +1,110 @@
+/// What the flight lane does: once a minor frame from sensors to motors, along whatever trajectory is
+/// committed.
+#pragma once
+
+#include <optional>
+
+#include "core/trajectory.hpp"
+#include "firmware_if/barometer.hpp"
+#include "firmware_if/gnss.hpp"
+#include "firmware_if/imu.hpp"
+#include "firmware_if/motors.hpp"
+#include "stages/control/estimator.hpp"
+#include "stages/control/tracker.hpp"
+
+namespace roborun::flight {
+
+class FlightControl {
+ public:
+  FlightControl(const stages::Estimator::Config& estimator, const stages::Tracker::Config& tracker)
+      : estimator_(estimator), tracker_(tracker), period_s_(tracker.period_s) {}
+
+  /// Straight up to the height of the first hover, flown as soon as the estimator has settled.
+  void set_cruise_height(double cruise_m) { cruise_m_ = cruise_m; }
+  /// While false the vehicle stays on the ground.
+  void allow_take_off(bool allowed) { may_take_off_ = allowed; }
+  /// A trajectory that takes over at its start time. The last one offered counts.
+  void offer(const Trajectory& trajectory) { offered_ = trajectory; }
+  /// The three steps of a minor frame, in this order. RT-safe: O(1), no allocation.
+  /// Reads all sensors, at most a ring's worth each, and estimates.
+  void sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_if::Barometer& barometer);
+  /// Switches to an offered trajectory that is due.
+  void commit(MonotonicTime now);
+  /// Tracks the committed trajectory and commands the motors; nothing before the take-off.
+  void track(MonotonicTime now, firmware_if::Motors& motors);
+  /// All three at once, where nobody asks what each of them takes.
+  template <typename Sensors>
+  void step(MonotonicTime now, Sensors& sensors, firmware_if::Motors& motors) {
+    sense(sensors, sensors, sensors);
+    commit(now);
+    track(now, motors);
+  }
+
+  [[nodiscard]] const Trajectory& committed() const { return committed_; }
+  /// Another number for each committed trajectory; 0 before the first.
+  [[nodiscard]] std::uint64_t committed_number() const { return committed_number_; }
+  [[nodiscard]] const stages::Estimator& estimator() const { return estimator_; }
+  [[nodiscard]] const stages::Tracker& tracker() const { return tracker_; }
+  /// The climb is over: decisions may begin.
+  [[nodiscard]] bool airborne() const { return airborne_; }
+
+  /// To a stop along the committed trajectory, whose path stays as it was checked; then it hovers there. What
+  /// was offered is dropped, and nothing offered is flown until then.
+  void brake();
+  /// Braked, and at the place of the stop.
+  [[nodiscard]] bool standing(MonotonicTime now) const;
+  /// Straight down from where it stands, slower near the height of the take-off, and on until it has landed.
+  void descend(MonotonicTime now, double speed_mps);
+  [[nodiscard]] bool descending() const { return descending_; }
+  /// Three witnesses for a second: it is told to go down, does not move although the reference is below it,
+  /// and the motors carry less than its weight. Latched; the motors are not commanded from then on.
+  [[nodiscard]] bool landed() const { return landed_; }
+
+  [[nodiscard]] bool flying() const { return flying_; }
+  /// Top of the climb. Precondition: flying().
+  [[nodiscard]] const Vector3& home_W() const { return home_W_; }
+  [[nodiscard]] double ground_m() const { return ground_m_; }
+  [[nodiscard]] const TrajectoryPoint& reference() const { return reference_; }
+  /// Validity of the newest fix that the estimator took and that differs from the one before.
+  [[nodiscard]] MonotonicTime last_fix() const { return last_fix_; }
+  /// No IMU sample for 25 ms, or the same numbers 20 times: a living one is never without noise.
+  [[nodiscard]] bool imu_lost(MonotonicTime now) const {
+    return imu_repeats_ >= kMostRepeats || estimator_.imu_lost(now);
+  }
+
+ private:
+  static constexpr int kMostRepeats = 20;
+  [[nodiscard]] TrajectoryPoint next_reference(MonotonicTime now);
+  void watch_touchdown(MonotonicTime now, const stages::EstimatedState& state);
+
+  stages::Estimator estimator_;
+  stages::Tracker tracker_;
+  double period_s_;  ///< The minor frame.
+  double cruise_m_{0.0};
+  Trajectory committed_{};
+  std::uint64_t committed_number_{0};
+  std::optional<Trajectory> offered_;
+  firmware_if::MotorCommand command_{};
+  std::optional<MonotonicTime> first_estimate_;
+  bool flying_{false};  ///< There is a trajectory to track.
+  bool airborne_{false};
+  double yaw_rad_{0.0};
+  bool may_take_off_{true};
+
+  Vector3 home_W_ = Vector3::Zero();
+  double ground_m_{0.0};
+  TrajectoryPoint reference_{};
+  firmware_if::ImuSample imu_{};
+  int imu_repeats_{0};
+  firmware_if::GnssFix fix_{};
+  MonotonicTime last_fix_{};
+
+  bool braking_{false};
+  double brake_at_s_{0.0};  ///< Where on the committed trajectory.
+  double brake_rate_{0.0};  ///< How fast along it, 1: as planned.
+  bool descending_{false};
+  bool landed_{false};
+  MonotonicTime moving_{};  ///< When the witnesses of a landing last disagreed.
+};
+
+}  // namespace roborun::flight

@@ -1,0 +1,71 @@
+#include "platform/flight/flight_program.hpp"
+
+#include <algorithm>
+
+namespace roborun::flight {
+
+using core::SlotId;
+using governor::Action;
+
+namespace {
+
+constexpr double kSeam_m = 0.3;  // between what is flown and what is offered
+
+}  // namespace
+
+void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
+  const MonotonicTime now = lane.release();
+  switch (slot) {
+    case SlotId::kWorld:
+      aircraft_.begin_frame(now);
+      return;
+    case SlotId::kSense:
+      control_.sense(aircraft_.imu(), aircraft_.gnss(), aircraft_.barometer());
+      return;
+    case SlotId::kCommit:
+      (void)mail_.decision.take();
+      pilot_.guard(now, mail_.decision.read());
+      take_offers(now, lane);
+      control_.commit(now);
+      return;
+    case SlotId::kTrack:
+      control_.track(now, aircraft_.motors());
+      aircraft_.end_frame(now);
+      return;
+    case SlotId::kPublish:
+      return publish(now);
+    default:
+      return;
+  }
+}
+
+void FlightProgram::publish(MonotonicTime now) noexcept {
+  FlightReport& report = mail_.report.draft();
+  report.estimated = control_.estimator().state(report.state) == Status::kOk;
+  report.past.catch_up(control_.estimator().past());
+  if (report.committed_number != control_.committed_number()) {
+    report.committed = control_.committed();
+    report.committed_number = control_.committed_number();
+  }
+  report.flying = control_.flying();
+  report.airborne = control_.airborne();
+  report.action = pilot_.action();
+  report.standing = control_.standing(now);
+  report.home_W = control_.home_W();
+  report.ground_m = control_.ground_m();
+  mail_.report.publish();
+}
+
+void FlightProgram::take_offers(MonotonicTime now, const core::LaneExecutive& lane) noexcept {
+  if (!mail_.offer.take()) return;
+  const Offer& offer = mail_.offer.read();
+  const MonotonicTime start = std::max(offer.trajectory.start_time, now);
+  const bool fits = (control_.committed().at(start).p_W - offer.trajectory.at(start).p_W).norm() < kSeam_m;
+  const bool braking = pilot_.action() == Action::kHold || (lane.reactions().braking() && !offer.is_stop);
+  if (fits && !braking)
+    control_.offer(offer.trajectory);
+  else
+    ++offers_refused_;
+}
+
+}  // namespace roborun::flight

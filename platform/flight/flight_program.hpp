@@ -1,0 +1,35 @@
+/// What runs in the slots of the flight lane, whether time is real or virtual.
+#pragma once
+
+#include <cstdint>
+
+#include "core/executive/frame_table.hpp"
+#include "core/executive/lane_executive.hpp"
+#include "platform/flight/failsafe_pilot.hpp"
+
+namespace roborun::flight {
+
+class FlightProgram final : public core::LaneProgram {
+ public:
+  FlightProgram(const FailsafePilot::Config& config, FlightControl& control, Aircraft& aircraft,
+                LaneMail& mail) noexcept
+      : control_(control), aircraft_(aircraft), mail_(mail), pilot_(config, control, aircraft) {}
+  /// A frame belongs to the instant of its release, however late it begins.
+  void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override;
+  /// Offers refused because an overrun or the failsafe has the vehicle brake, or because they begin elsewhere
+  /// than the committed trajectory will be; never decreases.
+  [[nodiscard]] std::uint64_t offers_refused() const noexcept { return offers_refused_; }
+  [[nodiscard]] const FailsafePilot& pilot() const noexcept { return pilot_; }
+
+ private:
+  void take_offers(MonotonicTime now, const core::LaneExecutive& lane) noexcept;
+  void publish(MonotonicTime now) noexcept;
+
+  FlightControl& control_;
+  Aircraft& aircraft_;
+  LaneMail& mail_;
+  FailsafePilot pilot_;
+  std::uint64_t offers_refused_{0};
+};
+
+}  // namespace roborun::flight

@@ -1,0 +1,70 @@
+#include "platform/flight/flight_system.hpp"
+
+#include <algorithm>
+
+namespace roborun::flight {
+namespace {
+
+constexpr double kMapMargin_m = 3.0;
+
+PipelineConfig pipeline_config(const FlightConfig& config, std::size_t cameras) noexcept {
+  PipelineConfig pipeline;
+  pipeline.flight_bounds_W = config.bounds_W;
+  pipeline.vehicle_radius_m = config.vehicle.radius_m;
+  pipeline.inflation_m = config.vehicle.tracking_error_m;
+  pipeline.acceleration_mps2 = config.vehicle.acceleration_mps2;
+  pipeline.map_bounds_W = map_bounds_W(config);
+  pipeline.cameras = cameras;
+  pipeline.horizon_m = config.camera_range_m - 1.0;
+  pipeline.fence = config.fence;
+  pipeline.minor_frame = config.minor_frame;
+  return pipeline;
+}
+
+governor::GovernorConfig governor_config(const FlightConfig& config) noexcept {
+  const auto cost_of = [&config](core::StageId id) { return seconds(config.costs.cost(id, {})); };
+  governor::GovernorConfig g;
+  g.design = config.design;
+  g.model = config.model;
+  g.point_cloud_s = cost_of(core::StageId::kPointCloud);
+  g.governor_s = config.design == governor::Design::kAware ? cost_of(core::StageId::kGovernor) : 0.0;
+  g.smoother_s = cost_of(core::StageId::kSmoother);
+  g.v_max_mps = config.vehicle.speed_mps;
+  g.vehicle_width_m = 2.0 * config.vehicle.radius_m;
+  const double range_m = config.camera_range_m;
+  const double height_m = map_bounds_W(config).size().z();
+  g.sensor_volume_max_m3 = 4.0 * range_m * range_m * std::min(height_m, 2.0 * range_m);
+  g.coarsest_level = coarsest_level_within(config.bounds_W.size().z() / 3.0);
+  g.minor_frame = config.minor_frame;
+  return g;
+}
+
+}  // namespace
+
+Aabb map_bounds_W(const FlightConfig& config) noexcept {
+  const Vector3 margin = Vector3::Constant(kMapMargin_m);
+  return {config.bounds_W.min_W - margin, config.bounds_W.max_W + margin};
+}
+
+double planned_radius_m(const FlightConfig& config) noexcept {
+  return config.vehicle.radius_m + config.vehicle.tracking_error_m;
+}
+
+std::size_t FlightSystem::arena_bytes() noexcept { return stages::PointCloud::arena_bytes({}); }
+
+FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, Aircraft& aircraft,
+                           std::span<firmware_if::DepthCamera* const> cameras, const FlightParts& parts,
+                           core::Arena& arena) noexcept
+    : map_(parts.map),
+      cloud_({}, arena),
+      governor_(governor_config(config)),
+      pipeline_(pipeline_config(config, cameras.size()), meter, governor_, cloud_, parts.map, parts.planner,
+                smoother_),
+      control_({}, {.period_s = seconds(config.minor_frame)}),
+      flight_program_({config.fence, config.answers}, control_, aircraft, mail_),
+      decision_program_({config.goal_W, config.seed, config.fence, config.minor_frame}, pipeline_, cameras,
+                        mail_) {
+  control_.set_cruise_height(config.cruise_m);
+}
+
+}  // namespace roborun::flight

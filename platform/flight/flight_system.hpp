@@ -1,0 +1,58 @@
+/// Everything that flies, for one vehicle and one goal: stages, governor, and the programs of the lanes.
+/// Lockstep and real time put the same system under different clocks.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "core/executive/stage_meter.hpp"
+#include "core/memory/arena.hpp"
+#include "core/memory/static_vector.hpp"
+#include "platform/flight/decision_pipeline.hpp"
+#include "platform/flight/decision_program.hpp"
+#include "platform/flight/flight_config.hpp"
+#include "platform/flight/flight_control.hpp"
+#include "platform/flight/flight_program.hpp"
+
+namespace roborun::flight {
+
+/// The two stages that may be the reader's own. They outlive the system.
+struct FlightParts {
+  stages::OccupancyMap& map;  ///< Of map_bounds_W(), at least.
+  stages::Planner& planner;
+};
+
+/// About 200 kB, without the memory in the arena: not for a small stack.
+class FlightSystem {
+ public:
+  /// Takes arena_bytes() from the arena: look at arena.exhausted() before the lanes start. At most
+  /// kMostCameras cameras; all references outlive the system.
+  FlightSystem(const FlightConfig& config, core::StageMeter& meter, Aircraft& aircraft,
+               std::span<firmware_if::DepthCamera* const> cameras, const FlightParts& parts,
+               core::Arena& arena) noexcept;
+  FlightSystem(const FlightSystem&) = delete;
+  FlightSystem& operator=(const FlightSystem&) = delete;
+
+  /// What the constructor takes from the arena.
+  [[nodiscard]] static std::size_t arena_bytes() noexcept;
+
+  [[nodiscard]] FlightControl& control() noexcept { return control_; }
+  [[nodiscard]] FlightProgram& flight_program() noexcept { return flight_program_; }
+  [[nodiscard]] const FailsafePilot& pilot() const noexcept { return flight_program_.pilot(); }
+  [[nodiscard]] DecisionProgram& decision_program() noexcept { return decision_program_; }
+  [[nodiscard]] const governor::Governor& governor() const noexcept { return governor_; }
+  [[nodiscard]] const stages::OccupancyMap& map() const noexcept { return map_; }
+
+ private:
+  stages::OccupancyMap& map_;
+  stages::PointCloud cloud_;
+  stages::Smoother smoother_;
+  governor::Governor governor_;
+  DecisionPipeline pipeline_;
+  FlightControl control_;
+  LaneMail mail_;
+  FlightProgram flight_program_;
+  DecisionProgram decision_program_;
+};
+
+}  // namespace roborun::flight

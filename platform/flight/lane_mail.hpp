@@ -1,0 +1,52 @@
+/// What the flight lane and the decision lane tell each other.
+#pragma once
+
+#include "core/exchange/mailbox.hpp"
+#include "core/geometry/vector.hpp"
+#include "core/trajectory.hpp"
+#include "firmware_if/time.hpp"
+#include "governor/failsafe/arbiter.hpp"
+#include "stages/control/estimator.hpp"
+
+namespace roborun::flight {
+
+/// Flight lane to decision lane, every minor frame. What is large is written only where it has changed since
+/// this cell of the mailbox was written last.
+struct FlightReport {
+  stages::EstimatedState state{};
+  bool estimated{false};  ///< There is a state.
+  stages::PastStates past{Nanos{0}};
+  Trajectory committed{};
+  std::uint64_t committed_number{0};
+  bool flying{false};
+  bool airborne{false};
+  governor::Action action{governor::Action::kGoOn};
+  bool standing{false};
+  Vector3 home_W = Vector3::Zero();
+  double ground_m{};
+};
+
+/// Decision lane to flight lane, after every decision that found something.
+struct Offer {
+  Trajectory trajectory{};
+  bool is_stop{false};  ///< Taken even while an overrun has the vehicle brake.
+};
+
+/// Decision lane to flight lane: how it is, at least once a decision.
+struct DecisionReport {
+  bool heard{false};
+  MonotonicTime due{};  ///< When it wants to be back.
+  double depth_age_s{};
+  int failures{};      ///< Decisions in a row without a usable answer.
+  int map_refusals{};  ///< Decisions in a row in which the map refused bricks.
+  bool site_known{false};
+  Vector3 site_W = Vector3::Zero();  ///< Below it everything is known to be free.
+};
+
+struct LaneMail {
+  core::Mailbox<FlightReport> report;
+  core::Mailbox<Offer> offer;
+  core::Mailbox<DecisionReport> decision;
+};
+
+}  // namespace roborun::flight

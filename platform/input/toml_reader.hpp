@@ -1,0 +1,73 @@
+/// Typed values of a TOML file, with the line in every complaint.
+#pragma once
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <toml++/toml.h>
+
+#include <cmath>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "core/geometry/vector.hpp"
+#include "platform/input/input_error.hpp"
+
+namespace roborun::input {
+
+/// Throws InputError with file and line if the text is not TOML.
+[[nodiscard]] inline toml::table parse_toml(const std::string& path, std::string_view text) {
+  try {
+    return toml::parse(text, path);
+  } catch (const toml::parse_error& error) {
+    throw InputError(
+        fmt::format("{}:{}: not valid TOML: {}", path, error.source().begin.line, error.description()));
+  }
+}
+
+/// Reads typed values of one TOML file and says where they are wrong.
+class TomlReader {
+ public:
+  explicit TomlReader(std::string path) : path_(std::move(path)) {}
+
+  [[noreturn]] void refuse(const toml::node& node, std::string_view key, std::string_view what) const {
+    throw InputError(fmt::format("{}:{}: {}: {}", path_, node.source().begin.line, key, what));
+  }
+  void allow_keys(const toml::table& table, std::string_view where,
+                  const std::set<std::string_view>& allowed) const {
+    for (const auto& [key, node] : table) {
+      if (allowed.count(key.str()) != 0) continue;
+      refuse(node, key.str(),
+             fmt::format("unknown key in {}: must be one of {}", where, fmt::join(allowed, ", ")));
+    }
+  }
+  const toml::node& need(const toml::table& table, std::string_view key, std::string_view where) const {
+    const toml::node* node = table.get(key);
+    if (node == nullptr) refuse(table, key, fmt::format("missing in {}", where));
+    return *node;
+  }
+  double number(const toml::node& node, std::string_view key) const {
+    const auto value = node.is_integer() || node.is_floating_point() ? node.value<double>() : std::nullopt;
+    if (!value || !std::isfinite(*value) || std::fabs(*value) > kLargest) {
+      refuse(node, key, "must be a finite number, at most 20000");
+    }
+    return *value;
+  }
+  double number_or(const toml::table& table, std::string_view key, double fallback) const {
+    const toml::node* node = table.get(key);
+    return node == nullptr ? fallback : number(*node, key);
+  }
+  Vector3 point(const toml::node& node, std::string_view key) const {
+    const toml::array* array = node.as_array();
+    if (array == nullptr || array->size() != 3) refuse(node, key, "must be three numbers: [x, y, z]");
+    return {number((*array)[0], key), number((*array)[1], key), number((*array)[2], key)};
+  }
+
+ private:
+  static constexpr double kLargest = 20e3;
+  std::string path_;
+};
+
+}  // namespace roborun::input

@@ -1,0 +1,24 @@
+#include "platform/mission/flight_setup.hpp"
+
+#include "platform/input/input_error.hpp"
+
+namespace roborun::mission {
+
+FlightSetup::FlightSetup(const flight::FlightConfig& config, const board::BackendNames& backends,
+                         const board::ImageLimits& images)
+    : block_(flight::FlightSystem::arena_bytes() + board::backend_bytes(map_bounds_W(config), images) + 4096),
+      arena_(block_),
+      parts_(board::make_backends(backends, map_bounds_W(config), images, arena_)) {}
+
+void FlightSetup::check() const {
+  if (arena_.exhausted()) throw InputError("memory plan: the arena is too small for this world");
+}
+
+std::vector<report::PoolUse> FlightSetup::pools() const {
+  std::vector<report::PoolUse> pools;
+  for (const core::PoolRecord& p : arena_.plan())
+    pools.push_back({p.name, p.element_bytes, p.count, p.high_water, p.tells_use});
+  return pools;
+}
+
+}  // namespace roborun::mission

@@ -1,0 +1,35 @@
+/// Memory, map and planner of a flight, taken before it begins.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/memory/arena.hpp"
+#include "platform/board/backends.hpp"
+#include "platform/flight/flight_system.hpp"
+#include "platform/report/mission_result.hpp"
+
+namespace roborun::mission {
+
+class FlightSetup {
+ public:
+  /// Throws InputError for an unknown map or planner, or a world too large for the map.
+  FlightSetup(const flight::FlightConfig& config, const board::BackendNames& backends,
+              const board::ImageLimits& images);
+  FlightSetup(const FlightSetup&) = delete;
+  FlightSetup& operator=(const FlightSetup&) = delete;
+
+  [[nodiscard]] flight::FlightParts parts() noexcept { return {*parts_.map, *parts_.planner}; }
+  [[nodiscard]] core::Arena& arena() noexcept { return arena_; }
+  /// To be asked once the flight system stands. Throws InputError if the arena was too small.
+  void check() const;
+  /// The memory plan, with what was used so far.
+  [[nodiscard]] std::vector<report::PoolUse> pools() const;
+
+ private:
+  std::vector<std::byte> block_;
+  core::Arena arena_;
+  board::MapAndPlanner parts_;
+};
+
+}  // namespace roborun::mission

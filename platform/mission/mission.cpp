@@ -1,0 +1,246 @@
+#include "platform/mission/mission.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "core/record/state_hash.hpp"
+#include "platform/flight/lockstep_flight.hpp"
+#include "platform/input/input_error.hpp"
+#include "platform/mission/flight_setup.hpp"
+#include "platform/mission/mission_faults.hpp"
+#include "platform/mission/mission_judge.hpp"
+#include "platform/mission/recording.hpp"
+#include "platform/sitl/aircraft/camera_rig.hpp"
+
+namespace roborun::mission {
+namespace {
+
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  const double at = q * static_cast<double>(values.size() - 1);
+  return values[static_cast<std::size_t>(std::ceil(at))];
+}
+
+/// Start and goal must be inside the fence, with room.
+const MissionConfig& checked(const sitl::World& world, const MissionConfig& config) {
+  const double room_m = planned_radius_m(config.flight);
+  for (const auto& [name, p_W] : {std::pair{"start", world.start_W()}, std::pair{"goal", world.goal_W()}}) {
+    if (!config.flight.fence.allows(Aabb::around(p_W, room_m)))
+      throw InputError(
+          fmt::format("fence: the {} ({:.2f}, {:.2f}, {:.2f}) must be inside, with {} m to spare", name,
+                      p_W.x(), p_W.y(), p_W.z(), room_m));
+  }
+  return config;
+}
+
+/// One mission: a flight in lockstep, and the judge of what it does.
+class MissionRun {
+ public:
+  MissionRun(const sitl::World& world, const MissionConfig& config);
+  report::MissionReport fly(const std::function<void(const Progress&)>& progress);
+
+ private:
+  [[nodiscard]] flight::FlightParts parts();
+  void begin_faults();
+  void record_decision(const flight::DecisionOutput& out);
+  void record_failsafe();
+  void summarise(double wall_s);
+
+  const sitl::World& world_;
+  const MissionConfig& config_;
+  flight::FlightConfig flight_config_;
+  MissionFaults faults_;
+  sitl::CameraRig rig_;
+  sitl::SimulatedAircraft aircraft_;
+  std::vector<firmware_if::DepthCamera*> cameras_;
+  std::unique_ptr<FlightRecorder> recorder_;  ///< Null: nothing is recorded.
+  FlightSetup setup_;
+  FaultyPlanner planner_;
+  flight::LockstepFlight flight_;
+  flight::FlightSystem& system_;
+  MissionJudge judge_;
+  core::StateHash hash_;
+  report::MissionReport report_;
+  std::vector<double> latencies_s_;
+};
+
+MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
+    : world_(world),
+      config_(checked(world, config)),
+      flight_config_(flight_config_of(world, config)),
+      faults_(config),
+      rig_(world, config.simulator.camera, config.seed),
+      aircraft_(config.simulator, ground_below(world), config.seed, config.flight.minor_frame, rig_),
+      cameras_(faults_.connect(rig_.cameras())),
+      recorder_(config.record.empty() ? nullptr
+                                      : std::make_unique<FlightRecorder>(config.record, flight_config_,
+                                                                         config, aircraft_, cameras_)),
+      setup_(flight_config_, config.backends, image_limits(config)),
+      planner_(setup_.parts().planner, faults_.line()),
+      flight_(flight_config_, recorder_ ? recorder_->aircraft() : aircraft_,
+              recorder_ ? recorder_->cameras() : std::span<firmware_if::DepthCamera* const>(cameras_),
+              parts(), setup_.arena()),
+      system_(flight_.system()),
+      judge_(config.judge, flight_config_.fence, flight_config_.vehicle.radius_m, world, aircraft_, system_) {
+  setup_.check();
+  if (!faults_.empty()) aircraft_.connect(faults_.line());
+  if (!config.flight.answers) aircraft_.ignore_kill_switch();
+}
+
+flight::FlightParts MissionRun::parts() {
+  flight::FlightParts parts = setup_.parts();
+  if (faults_.empty()) return parts;
+  return {parts.map, planner_};
+}
+
+/// Those that begin with the next minor frame.
+void MissionRun::begin_faults() {
+  const MonotonicTime now = flight_.now() + config_.flight.minor_frame;
+  if (faults_.advance(now, system_.pilot().phase()))
+    judge_.safety().first_fault_s = seconds(now.time_since_epoch());
+  if (faults_.empty()) return;
+  aircraft_.set_mean_wind(faults_.mean_wind_W_mps());
+  faults_.refuse_bricks(setup_.arena());
+}
+
+void MissionRun::record_decision(const flight::DecisionOutput& out) {
+  if (recorder_) recorder_->decided(out);
+  const OperatingPoint& point = out.decision.point;
+  report::DecisionRecord r;
+  r.time_s = seconds(flight_.now().time_since_epoch());
+  r.p_WB = aircraft_.vehicle().state().p_WB;
+  r.speed_mps = aircraft_.vehicle().state().v_WB.norm();
+  r.p0_m = cell_size_m(point.p0_level);
+  r.p1_m = cell_size_m(point.p1_level);
+  r.v0_m3 = out.work[static_cast<std::size_t>(core::StageId::kMap)].volume_m3;
+  r.v1_m3 = out.work[static_cast<std::size_t>(core::StageId::kExport)].volume_m3;
+  r.v2_m3 = out.work[static_cast<std::size_t>(core::StageId::kPlanner)].volume_m3;
+  r.time_budget_s = seconds(out.decision.time_budget);
+  r.budget_source = governor::to_string(out.decision.source);
+  r.deadline_s = seconds(point.deadline);
+  r.latency_s = seconds(out.latency);
+  for (std::size_t i = 0; i < core::kStageCount; ++i) r.stage_s[i] = seconds(out.cost[i]);
+  r.predicted_s = out.decision.predicted_s;
+  r.demand_m = out.decision.demand_m;
+  const governor::SolverSolution& solution = out.decision.solution;
+  r.solver = to_string(solution.status);
+  const auto active = [&r](const char* name) {
+    r.active += (r.active.empty() ? "" : "+") + std::string(name);
+  };
+  for (std::size_t i = 0; i < governor::kConstraintCount; ++i) {
+    if (((solution.active >> i) & 1U) != 0) active(governor::to_string(static_cast<governor::Constraint>(i)));
+  }
+  for (const governor::Reason reason : governor::kReasons) {
+    if ((solution.active & reason) != 0) active(governor::to_string(reason));
+  }
+  if (out.decision.open) active("open");
+  r.speed_limit_mps = point.speed_limit_mps;
+  r.visible_m = out.profile.closest_unknown_m;
+  r.closest_obstacle_m = out.profile.closest_obstacle_m;
+  r.gap_average_m = out.profile.gap_average_m;
+  r.sensor_volume_m3 = out.profile.sensor_volume_m3;
+  r.map_volume_m3 = out.profile.map_volume_m3;
+  r.planner_status = to_string(out.planner_status);
+  r.smoother_status = to_string(out.smoother_status);
+  r.missed = out.latency > point.deadline;
+  hash_.add(r.latency_s);
+  hash_.add(r.deadline_s);
+  hash_.add(static_cast<std::uint64_t>(point.p0_level));
+  hash_.add(static_cast<std::uint64_t>(point.p1_level));
+  latencies_s_.push_back(r.latency_s);
+  report_.decisions.push_back(std::move(r));
+}
+
+void MissionRun::summarise(double wall_s) {
+  report::MissionResult& r = report_.result;
+  r.design = governor::to_string(config_.flight.design);
+  r.profile = config_.profile_name;
+  r.seed = config_.seed;
+  r.map = config_.backends.map;
+  r.planner = config_.backends.planner;
+  r.mission_time_s = seconds(flight_.now().time_since_epoch());
+  r.mean_velocity_mps = r.mission_time_s > 0.0 ? r.distance_m / r.mission_time_s : 0.0;
+  r.energy_kJ = 1e-3 * aircraft_.vehicle().state().energy_J;
+  r.decisions = report_.decisions.size();
+  std::vector<double> precision_m;
+  for (const report::DecisionRecord& d : report_.decisions) {
+    r.deadline_misses += d.missed ? 1U : 0U;
+    r.cpu_s += d.latency_s;
+    precision_m.push_back(d.p0_m);
+  }
+  r.latency_s = {quantile(latencies_s_, 0.5), quantile(latencies_s_, 0.99), quantile(latencies_s_, 1.0)};
+  r.cpu_utilization_ratio = r.mission_time_s > 0.0 ? r.cpu_s / r.mission_time_s : 0.0;
+  r.precision_m = {quantile(precision_m, 0.0), quantile(precision_m, 0.5), quantile(precision_m, 1.0)};
+  r.real_time_factor = wall_s > 0.0 ? r.mission_time_s / wall_s : 0.0;
+  r.map_bytes = system_.map().bytes();
+  r.speed_limit_mps = system_.governor().v_max_mps();
+  hash_.add(system_.map().digest());
+  r.state_hash = fmt::format("{:016x}", hash_.value());
+}
+
+void MissionRun::record_failsafe() {
+  report_.safety = judge_.safety();
+  report_.safety.end_W = aircraft_.vehicle().state().p_WB;
+  report_.safety.landing_site_was_known = system_.pilot().site_was_known();
+  for (const flight::FailsafeEvent& e : system_.pilot().events()) {
+    report::FailsafeRecord record{
+        seconds(e.time.time_since_epoch()), governor::to_string(e.action), governor::to_string(e.phase), {}};
+    for (const governor::FailsafeRow& row : governor::kFailsafeTable) {
+      if ((e.conditions & governor::bit(row.condition)) != 0)
+        record.conditions.emplace_back(governor::to_string(row.condition));
+    }
+    report_.safety.actions.push_back(std::move(record));
+  }
+}
+
+report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>& progress) {
+  const auto wall_start = std::chrono::steady_clock::now();
+  const double whole_m = (world_.goal_W() - world_.start_W()).norm();
+  const char* reason = nullptr;
+  for (std::uint64_t frame = 0; reason == nullptr; ++frame) {
+    const Vector3 before_W = aircraft_.vehicle().state().p_WB;
+    begin_faults();
+    const MonotonicTime now = flight_.now() + config_.flight.minor_frame;
+    if (const flight::DecisionOutput* decision = flight_.step(faults_.computer(now)))
+      record_decision(*decision);
+    const sitl::VehicleState& s = aircraft_.vehicle().state();
+    report_.result.distance_m += (s.p_WB - before_W).norm();
+    report_.result.max_velocity_mps = std::max(report_.result.max_velocity_mps, s.v_WB.norm());
+    hash_.add(s.p_WB);
+    hash_.add(s.v_WB);
+    if (frame % 40 == 0) report_.path.push_back({seconds(now.time_since_epoch()), s.p_WB, s.v_WB.norm()});
+    if (frame % 400 == 0 && progress) {
+      progress({seconds(now.time_since_epoch()),
+                std::clamp(1.0 - (world_.goal_W() - s.p_WB).norm() / whole_m, 0.0, 1.0), s.v_WB.norm()});
+    }
+    if (config_.each_frame)
+      config_.each_frame({now, s, system_.control().committed(), system_.control().airborne()});
+    const bool gave_up = judge_.given_up();
+    reason = judge_.judge(now);
+    if (recorder_ && judge_.given_up() && !gave_up) recorder_->gave_up();
+  }
+  if (recorder_) recorder_->finish(system_.map());
+  report_.result.reason = reason;
+  report_.result.reached_goal = report_.result.reason == "reached_goal";
+  report_.result.collided = judge_.collided();
+  report_.pools = setup_.pools();
+  record_failsafe();
+  summarise(std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count());
+  return std::move(report_);
+}
+
+}  // namespace
+
+report::MissionReport fly_mission(const sitl::World& world, const MissionConfig& config,
+                                  const std::function<void(const Progress&)>& progress) {
+  const auto run = std::make_unique<MissionRun>(world, config);
+  return run->fly(progress);
+}
+
+}  // namespace roborun::mission

@@ -1,0 +1,35 @@
+#include "platform/mission/mission_config.hpp"
+
+#include <fmt/format.h>
+
+#include "platform/input/input_error.hpp"
+
+namespace roborun::mission {
+
+governor::Design design_of(const char* option, const std::string& name) {
+  for (const auto design :
+       {governor::Design::kAware, governor::Design::kStatic, governor::Design::kStaticFair}) {
+    if (name == governor::to_string(design)) return design;
+  }
+  throw InputError(fmt::format(
+      "{}: unknown design '{}': must be aware, static, static-fair, or several with commas between", option,
+      name));
+}
+
+flight::FlightConfig flight_config_of(const sitl::World& world, const MissionConfig& config) {
+  flight::FlightConfig flight = config.flight;
+  flight.bounds_W = world.bounds_W();
+  flight.goal_W = world.goal_W();
+  flight.cruise_m = world.start_W().z();
+  flight.camera_range_m = config.simulator.camera.range_m;
+  flight.seed = config.seed;
+  return flight;
+}
+
+Vector3 ground_below(const sitl::World& world) { return {world.start_W().x(), world.start_W().y(), 0.0}; }
+
+board::ImageLimits image_limits(const MissionConfig& config) {
+  return {config.simulator.camera.pixels, config.simulator.camera.range_m};
+}
+
+}  // namespace roborun::mission

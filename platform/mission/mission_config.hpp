@@ -1,0 +1,73 @@
+/// What a simulated mission depends on besides its world, by who reads it.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/trajectory.hpp"
+#include "governor/failsafe/arbiter.hpp"
+#include "platform/board/backends.hpp"
+#include "platform/flight/flight_config.hpp"
+#include "platform/sitl/aircraft/simulated_aircraft.hpp"
+#include "platform/sitl/fault/fault_line.hpp"
+#include "platform/sitl/world/world.hpp"
+
+namespace roborun::mission {
+
+/// What there is to see after one minor frame.
+struct FrameRecord {
+  MonotonicTime now{};
+  const sitl::VehicleState& truth;
+  const Trajectory& committed;
+  bool airborne{};
+};
+
+/// A fault, and when it begins.
+struct TimedFault {
+  sitl::Fault fault{};
+  std::optional<governor::Phase> phase{};  ///< Time counts from the first moment of this phase; none: from 0.
+  double at_s{0.0};
+  double for_s{1e6};
+};
+
+/// A processor that is throttled in flight.
+struct SlowDown {
+  double at_s{1e300};  ///< From then on computing takes `factor` times as long.
+  double factor{1.0};
+  [[nodiscard]] double slower(MonotonicTime now) const noexcept {
+    return seconds(now.time_since_epoch()) >= at_s ? factor : 1.0;
+  }
+};
+
+/// When the judge ends a mission.
+struct JudgeConfig {
+  double time_limit_s{7200.0};
+  double no_progress_s{120.0};  ///< Not nearer to the goal for so long: it is given up, hovering.
+};
+
+struct MissionConfig {
+  std::string profile_name{"paper"};  ///< A label, for reports.
+  std::uint64_t seed{1};              ///< Of the planner, and of all noise, faults and gusts.
+  flight::FlightConfig flight{};      ///< What the world gives (bounds, goal, height) is filled in from it.
+  board::BackendNames backends{};
+  sitl::SimulatorConfig simulator{};
+  SlowDown slow_down{};
+  JudgeConfig judge{};
+  std::vector<TimedFault> faults{};  ///< At most sitl::FaultLine::kMost.
+  std::string record{};              ///< File for the recording of the flight; empty: none.
+  /// Called after every minor frame, may be empty: what a test measures.
+  std::function<void(const FrameRecord&)> each_frame{};
+};
+
+/// The flight through `world`: its bounds, its goal, the height of its start, and the rest from `config`.
+[[nodiscard]] flight::FlightConfig flight_config_of(const sitl::World& world, const MissionConfig& config);
+/// Where the vehicle stands before the flight.
+[[nodiscard]] Vector3 ground_below(const sitl::World& world);
+/// Of the images that the map will get.
+[[nodiscard]] board::ImageLimits image_limits(const MissionConfig& config);
+/// "aware", "static" or "static-fair". Throws InputError that names the option.
+[[nodiscard]] governor::Design design_of(const char* option, const std::string& name);
+
+}  // namespace roborun::mission

@@ -1,0 +1,51 @@
+/// Judges a simulated mission by the true world: collisions, safety, and when and why it ends.
+#pragma once
+
+#include "core/geometry/fence.hpp"
+#include "platform/flight/flight_system.hpp"
+#include "platform/mission/mission_config.hpp"
+#include "platform/report/mission_result.hpp"
+#include "platform/sitl/aircraft/simulated_aircraft.hpp"
+#include "platform/sitl/world/world.hpp"
+
+namespace roborun::mission {
+
+class MissionJudge {
+ public:
+  /// What it judges must outlive it.
+  MissionJudge(const JudgeConfig& config, const core::Fence& fence, double radius_m, const sitl::World& world,
+               const sitl::SimulatedAircraft& aircraft, flight::FlightSystem& system)
+      : config_(config),
+        fence_(fence),
+        radius_m_(radius_m),
+        world_(world),
+        aircraft_(aircraft),
+        system_(system) {}
+
+  /// To be called after every minor frame. Why the mission is over, or null: it goes on. A mission that is
+  /// given up (too late, no progress) goes on without decisions until the vehicle stands.
+  [[nodiscard]] const char* judge(MonotonicTime now);
+  [[nodiscard]] bool given_up() const noexcept { return give_up_ != nullptr; }
+  [[nodiscard]] bool collided() const noexcept { return collided_; }
+  [[nodiscard]] report::SafetyRecord& safety() noexcept { return safety_; }
+
+ private:
+  void watch(MonotonicTime now);
+  [[nodiscard]] const char* failsafe_reason(MonotonicTime now) const;
+
+  const JudgeConfig& config_;
+  const core::Fence& fence_;
+  double radius_m_;  ///< Of the vehicle's body, a sphere.
+  const sitl::World& world_;
+  const sitl::SimulatedAircraft& aircraft_;
+  flight::FlightSystem& system_;
+  report::SafetyRecord safety_;
+  const char* give_up_{nullptr};  ///< Why the vehicle stops where it is.
+  bool collided_{false};
+  bool left_ground_{false};
+  double sink_mps_{0.0};
+  double best_distance_m_{1e300};
+  MonotonicTime best_at_{};
+};
+
+}  // namespace roborun::mission

@@ -1,0 +1,169 @@
+#include "platform/mission/recorded_flight.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <nlohmann/json.hpp>
+
+#include "platform/input/input_error.hpp"
+
+namespace roborun::mission {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::uint32_t kVersion = 2;
+constexpr double kFarthest_m = 20e3;  // as in world files
+
+Json vector_json(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
+
+Json fence_json(const core::Fence& fence) {
+  Json j = {{"areas", Json::array()}};
+  if (fence.limits_altitude()) j["altitude_m"] = {fence.lowest_m(), fence.highest_m()};
+  for (const core::Fence::Area& area : fence.areas()) {
+    Json points = Json::array();
+    for (std::size_t i = 0; i < area.count; ++i) points.push_back({area.point[i].x_m, area.point[i].y_m});
+    j["areas"].push_back({{"keep_in", area.side == core::FenceSide::kKeepIn},
+                          {"radius_m", area.radius_m},
+                          {"points", std::move(points)}});
+  }
+  return j;
+}
+
+/// Throws InputError or Json::exception.
+double number(const Json& json, const char* key, double least, double most) {
+  const double value = json.at(key).get<double>();
+  if (!(value >= least && value <= most))
+    throw InputError(fmt::format("{}: {} is not within {} and {}", key, value, least, most));
+  return value;
+}
+Vector3 vector(const Json& json, const char* key) {
+  const auto v = json.at(key).get<std::array<double, 3>>();
+  return {v[0], v[1], v[2]};
+}
+template <std::size_t N>
+void numbers(const Json& json, const char* key, std::array<double, N>& to) {
+  to = json.at(key).get<std::array<double, N>>();
+  for (const double x : to) {
+    if (!(x >= 0.0 && x <= 1e6)) throw InputError(fmt::format("{}: {} is not within 0 and 1e6", key, x));
+  }
+}
+
+core::Fence read_fence(const Json& json) {
+  core::Fence fence;
+  const auto check = [](core::FenceFault fault) {
+    if (fault != core::FenceFault::kNone) throw InputError(fmt::format("fence: {}", core::to_string(fault)));
+  };
+  if (json.contains("altitude_m")) {
+    const auto v = json.at("altitude_m").get<std::array<double, 2>>();
+    check(fence.set_altitude(v[0], v[1]));
+  }
+  for (const Json& area : json.at("areas")) {
+    const core::FenceSide side =
+        area.at("keep_in").get<bool>() ? core::FenceSide::kKeepIn : core::FenceSide::kKeepOut;
+    std::vector<core::FencePoint> points;
+    for (const auto& p : area.at("points").get<std::vector<std::array<double, 2>>>())
+      points.push_back({p[0], p[1]});
+    const double radius_m = area.at("radius_m").get<double>();
+    check(radius_m > 0.0 && points.size() == 1 ? fence.add_circle(side, points.front(), radius_m)
+                                               : fence.add_polygon(side, points));
+  }
+  return fence;
+}
+
+Vector3 place(const Json& json, const char* key) {
+  const Vector3 p_W = vector(json, key);
+  if (!is_finite(p_W) || p_W.cwiseAbs().maxCoeff() > kFarthest_m)
+    throw InputError(fmt::format("{}: not within {} m", key, kFarthest_m));
+  return p_W;
+}
+
+VehicleModel read_vehicle(const Json& json) {
+  VehicleModel vehicle;
+  for (const VehicleKey& key : kVehicleKeys)
+    vehicle.*key.value = number(json.at(key.table), key.key, key.low, key.high);
+  return vehicle;
+}
+
+Json vehicle_json(const VehicleModel& vehicle) {
+  Json j;
+  for (const VehicleKey& key : kVehicleKeys) j[key.table][key.key] = vehicle.*key.value;
+  return j;
+}
+
+}  // namespace
+
+std::string to_json(const RecordedFlight& recorded) {
+  const flight::FlightConfig& flight = recorded.flight;
+  Json j;
+  j["roborun_recording"] = kVersion;
+  j["vehicle"] = vehicle_json(flight.vehicle);
+  j["min_W"] = vector_json(flight.bounds_W.min_W);
+  j["max_W"] = vector_json(flight.bounds_W.max_W);
+  j["goal_W"] = vector_json(flight.goal_W);
+  j["cruise_m"] = flight.cruise_m;
+  j["design"] = governor::to_string(flight.design);
+  j["seed"] = flight.seed;
+  j["map"] = recorded.backends.map;
+  j["planner"] = recorded.backends.planner;
+  j["minor_frame_ns"] = flight.minor_frame.count();
+  j["pixels"] = recorded.images.side_pixels;
+  j["range_m"] = recorded.images.range_m;
+  j["slow_down_at_s"] = recorded.slow_down.at_s;
+  j["slow_down_factor"] = recorded.slow_down.factor;
+  j["answers"] = flight.answers;
+  j["fence"] = fence_json(flight.fence);
+  for (const firmware_if::CameraMount& mount : recorded.mounts)
+    j["mounts"].push_back({{"R_BC", mount.R_BC}, {"p_BC_m", mount.p_BC_m}});
+  for (const core::StageCost& c : flight.costs.stage)
+    j["costs"].push_back({{"fixed_s", c.fixed_s}, {"per_unit_s", c.per_unit_s}, {"per_m3_s", c.per_m3_s}});
+  for (const governor::LatencyModel& m : flight.model)
+    j["models"].push_back({{"fixed_s", m.fixed_s}, {"slope_s_per_m3", m.slope_s_per_m3}});
+  return j.dump();
+}
+
+RecordedFlight recorded_flight_from(std::span<const std::byte> json) {
+  const auto* text = reinterpret_cast<const char*>(json.data());
+  const Json j = Json::parse(text, text + json.size());
+  if (j.at("roborun_recording") != kVersion) throw InputError("of another version");
+  RecordedFlight recorded;
+  flight::FlightConfig& flight = recorded.flight;
+  flight.vehicle = read_vehicle(j.at("vehicle"));
+  flight.bounds_W = {place(j, "min_W"), place(j, "max_W")};
+  if (!((flight.bounds_W.size().array() > 0.0).all())) throw InputError("max_W: must be above min_W");
+  flight.goal_W = place(j, "goal_W");
+  flight.cruise_m = number(j, "cruise_m", -kFarthest_m, kFarthest_m);
+  flight.design = design_of("design", j.at("design").get<std::string>());
+  flight.seed = j.at("seed").get<std::uint64_t>();
+  recorded.backends = {j.at("map").get<std::string>(), j.at("planner").get<std::string>()};
+  flight.minor_frame = Nanos{j.at("minor_frame_ns").get<std::int64_t>()};
+  const auto rate_Hz = static_cast<int>(1e9 / number(j, "minor_frame_ns", 1e6, 1e9));
+  if (!core::is_flight_rate(rate_Hz) || core::minor_frame_of(rate_Hz) != flight.minor_frame)
+    throw InputError("minor_frame_ns: no rate of the flight lane");
+  recorded.images.side_pixels = static_cast<std::uint16_t>(number(j, "pixels", 8, 512));
+  recorded.images.range_m = number(j, "range_m", 1, 200);
+  flight.camera_range_m = recorded.images.range_m;
+  recorded.slow_down = {number(j, "slow_down_at_s", 0, 1e300), number(j, "slow_down_factor", 0.001, 1000)};
+  flight.answers = j.at("answers").get<bool>();
+  flight.fence = read_fence(j.at("fence"));
+  const Json& mounts = j.at("mounts");
+  if (mounts.empty() || mounts.size() > flight::kMostCameras)
+    throw InputError(fmt::format("mounts: must be 1 to {}", flight::kMostCameras));
+  for (const Json& mount : mounts) {
+    recorded.mounts.push_back(
+        {mount.at("R_BC").get<std::array<double, 9>>(), mount.at("p_BC_m").get<std::array<double, 3>>()});
+  }
+  for (std::size_t i = 0; i < core::kStageCount; ++i) {
+    const Json& c = j.at("costs").at(i);
+    numbers(c, "fixed_s", flight.costs.stage[i].fixed_s);
+    flight.costs.stage[i].per_unit_s = number(c, "per_unit_s", 0, 1e6);
+    numbers(c, "per_m3_s", flight.costs.stage[i].per_m3_s);
+  }
+  for (std::size_t i = 0; i < flight.model.size(); ++i) {
+    numbers(j.at("models").at(i), "fixed_s", flight.model[i].fixed_s);
+    numbers(j.at("models").at(i), "slope_s_per_m3", flight.model[i].slope_s_per_m3);
+  }
+  return recorded;
+}
+
+}  // namespace roborun::mission

@@ -1,0 +1,252 @@
+#include "platform/mission/scenario_file.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "platform/board/board_profile.hpp"
+#include "platform/input/arguments.hpp"
+#include "platform/input/text_file.hpp"
+#include "platform/input/toml_reader.hpp"
+#include "platform/mission/settings_file.hpp"
+#include "platform/sitl/world/body_reader.hpp"
+#include "platform/sitl/world/generator.hpp"
+#include "platform/sitl/world/world_file.hpp"
+
+namespace roborun::mission {
+namespace {
+
+constexpr std::array<const char*, 10> kOutcomes{"reached_goal",    "landed",    "holding",    "terminated",
+                                                "killed",          "collision", "time_limit", "battery_empty",
+                                                "no_path_to_goal", "struck"};
+
+class ScenarioReader {
+ public:
+  explicit ScenarioReader(const std::string& path)
+      : path_(path),
+        reader_(path),
+        root_(input::parse_toml(path, input::read_text(path, "a readable TOML file"))) {}
+  Scenario read();
+
+ private:
+  void read_head(Scenario& s) const;
+  void read_faults(Scenario& s) const;
+  void read_expectation(Scenario& s) const;
+  std::string text(const toml::node& node, std::string_view key) const {
+    const auto value = node.value_exact<std::string>();
+    if (!value) reader_.refuse(node, key, "must be a text in quotes");
+    return *value;
+  }
+  /// The index of the text among the names.
+  template <typename Names>
+  std::size_t choice(const toml::node& node, std::string_view key, const Names& names) const {
+    const std::string value = text(node, key);
+    const auto found = std::find(names.begin(), names.end(), value);
+    if (found == names.end())
+      reader_.refuse(node, key, fmt::format("'{}' must be one of {}", value, fmt::join(names, ", ")));
+    return static_cast<std::size_t>(found - names.begin());
+  }
+  double number(const toml::node& node, std::string_view key, double low, double high) const {
+    const double value = reader_.number(node, key);
+    if (!(value >= low && value <= high))
+      reader_.refuse(node, key, fmt::format("must be a number from {} to {}", low, high));
+    return value;
+  }
+  std::optional<double> maybe(const toml::table& table, const char* key, double high) const {
+    const toml::node* node = table.get(key);
+    return node == nullptr ? std::nullopt : std::optional(number(*node, key, 0.0, high));
+  }
+  bool truth(const toml::node& node, std::string_view key) const {
+    const auto value = node.value_exact<bool>();
+    if (!value) reader_.refuse(node, key, "must be true or false");
+    return *value;
+  }
+  const toml::table& table(const char* name) const {
+    const toml::node& node = reader_.need(root_, name, "the file");
+    if (node.as_table() == nullptr) reader_.refuse(node, name, fmt::format("must be a table: [{}]", name));
+    return *node.as_table();
+  }
+
+  std::string path_;
+  input::TomlReader reader_;
+  toml::table root_;
+};
+
+template <typename Enum, std::size_t N>
+std::array<const char*, N> names_of() {
+  std::array<const char*, N> names{};
+  for (std::size_t i = 0; i < N; ++i) names[i] = governor::to_string(static_cast<Enum>(i));
+  return names;
+}
+
+void ScenarioReader::read_head(Scenario& s) const {
+  const toml::table& head = table("scenario");
+  reader_.allow_keys(head, "[scenario]",
+                     {"about", "world", "environment", "seed", "design", "answers", "cost_factor"});
+  s.about = text(reader_.need(head, "about", "[scenario]"), "about");
+  const toml::node* world = head.get("world");
+  const toml::node* environment = head.get("environment");
+  if ((world == nullptr) == (environment == nullptr))
+    reader_.refuse(head, "world", "must be there, or environment, and not both");
+  if (world != nullptr)
+    s.world = (std::filesystem::path(path_).parent_path() / text(*world, "world")).string();
+  if (environment != nullptr) s.environment = text(*environment, "environment");
+  if (const toml::node* node = head.get("seed")) {
+    const double seed = number(*node, "seed", 0, 20000);
+    s.config.seed = static_cast<std::uint64_t>(seed);
+  }
+  if (const toml::node* node = head.get("design")) {
+    constexpr std::array<const char*, 3> kDesigns{"aware", "static", "static-fair"};
+    s.config.flight.design = static_cast<governor::Design>(choice(*node, "design", kDesigns));
+  }
+  if (const toml::node* node = head.get("cost_factor")) {
+    const double factor = number(*node, "cost_factor", 0.01, 100.0);
+    for (core::StageCost& cost : s.config.flight.costs.stage) cost = core::slower(cost, factor);
+    for (governor::LatencyModel& model : s.config.flight.model) {
+      for (double& fixed_s : model.fixed_s) fixed_s *= factor;
+      for (double& slope_s_per_m3 : model.slope_s_per_m3) slope_s_per_m3 *= factor;
+    }
+  }
+  if (const toml::node* node = head.get("answers")) s.config.flight.answers = truth(*node, "answers");
+}
+
+void ScenarioReader::read_faults(Scenario& s) const {
+  const toml::node* list = root_.get("fault");
+  if (list == nullptr) return;
+  if (list->as_array() == nullptr) reader_.refuse(*list, "fault", "must be written as [[fault]]");
+  std::array<const char*, sitl::kComponentCount> names{};
+  for (std::size_t i = 0; i < names.size(); ++i) names[i] = sitl::kComponents[i].name;
+  for (const toml::node& node : *list->as_array()) {
+    const toml::table* fault = node.as_table();
+    if (fault == nullptr) reader_.refuse(node, "fault", "must be written as [[fault]]");
+    reader_.allow_keys(*fault, "[[fault]]", {"component", "kind", "instance", "phase", "at_s", "for_s"});
+    TimedFault f;
+    const sitl::ComponentSpec& spec =
+        sitl::kComponents[choice(reader_.need(*fault, "component", "[[fault]]"), "component", names)];
+    std::vector<const char*> kinds;
+    for (std::size_t k = 1; k < sitl::kFaultKindNames.size(); ++k) {
+      if ((spec.kinds & sitl::bit(static_cast<sitl::FaultKind>(k))) != 0)
+        kinds.push_back(sitl::kFaultKindNames[k]);
+    }
+    const std::size_t kind = choice(reader_.need(*fault, "kind", "[[fault]]"), "kind", kinds);
+    const auto of_all = std::find(sitl::kFaultKindNames.begin(), sitl::kFaultKindNames.end(), kinds[kind]);
+    f.fault.component = spec.component;
+    f.fault.kind = static_cast<sitl::FaultKind>(of_all - sitl::kFaultKindNames.begin());
+    if (const toml::node* instance = fault->get("instance"))
+      f.fault.instance = static_cast<int>(number(*instance, "instance", 0, spec.instances - 1));
+    if (const toml::node* phase = fault->get("phase"))
+      f.phase = static_cast<governor::Phase>(
+          choice(*phase, "phase", names_of<governor::Phase, governor::kPhaseCount>()));
+    f.at_s = maybe(*fault, "at_s", 7200).value_or(0.0);
+    f.for_s = maybe(*fault, "for_s", 7200).value_or(f.for_s);
+    if (s.config.faults.size() == sitl::FaultLine::kMost)
+      reader_.refuse(node, "fault", fmt::format("must be at most {}", sitl::FaultLine::kMost));
+    s.config.faults.push_back(f);
+  }
+}
+
+void ScenarioReader::read_expectation(Scenario& s) const {
+  const toml::table& t = table("expect");
+  reader_.allow_keys(t, "[expect]",
+                     {"outcome", "action", "condition", "within_s", "motors_stop_within_s", "touchdown_mps",
+                      "home_within_m", "landing_site_known"});
+  s.expect.outcome = kOutcomes[choice(reader_.need(t, "outcome", "[expect]"), "outcome", kOutcomes)];
+  if (const toml::node* node = t.get("action"))
+    s.expect.action = governor::to_string(static_cast<governor::Action>(
+        choice(*node, "action", names_of<governor::Action, governor::kActionCount>())));
+  if (const toml::node* node = t.get("condition"))
+    s.expect.condition = governor::to_string(static_cast<governor::Condition>(
+        choice(*node, "condition", names_of<governor::Condition, governor::kConditionCount>())));
+  s.expect.within_s = maybe(t, "within_s", 7200);
+  s.expect.motors_stop_within_s = maybe(t, "motors_stop_within_s", 7200);
+  s.expect.touchdown_mps = maybe(t, "touchdown_mps", 100);
+  s.expect.home_within_m = maybe(t, "home_within_m", 20000);
+  if (const toml::node* node = t.get("landing_site_known"))
+    s.expect.landing_site_known = truth(*node, "landing_site_known");
+}
+
+Scenario ScenarioReader::read() {
+  std::set<std::string_view> keys = kSettingsTables;
+  keys.insert({"scenario", "fault", "body", "expect"});
+  reader_.allow_keys(root_, "the file", keys);
+  Scenario s;
+  s.name = std::filesystem::path(path_).stem().string();
+  const board::Profile profile = board::paper();
+  s.config.flight.costs = profile.costs;
+  s.config.flight.model = profile.model;
+  s.config.judge.time_limit_s = 300.0;
+  read_head(s);
+  read_settings(reader_, root_, s.config);
+  read_faults(s);
+  s.bodies = sitl::read_bodies(reader_, root_);
+  read_expectation(s);
+  return s;
+}
+
+}  // namespace
+
+Scenario load_scenario(const std::string& path) { return ScenarioReader(path).read(); }
+
+report::MissionReport fly_scenario(const Scenario& s) {
+  sitl::World world = s.world.empty() ? sitl::generate(sitl::environment(s.environment).knobs,
+                                                       sitl::Mission::kPackageDelivery, s.config.seed)
+                                      : sitl::load_world(s.world, {});
+  world.add(s.bodies);
+  report::MissionReport report = fly_mission(world, s.config, {});
+  report.result.env = s.name;
+  return report;
+}
+
+std::vector<std::string> complaints_of(const Scenario& s, const report::MissionReport& report) {
+  const report::SafetyRecord& safety = report.safety;
+  const Expectation& e = s.expect;
+  std::vector<std::string> complaints;
+  const auto complain = [&complaints](std::string text) { complaints.push_back(std::move(text)); };
+  if (report.result.reason != e.outcome)
+    complain(fmt::format("outcome is {}, not {}", report.result.reason, e.outcome));
+  if (safety.left_fence) complain("it left the fence");
+  const std::string action = safety.actions.empty() ? "go_on" : safety.actions.back().action;
+  if (e.action && action != *e.action)
+    complain(fmt::format("the last action is {}, not {}", action, *e.action));
+  const auto saw = [&e](const report::FailsafeRecord& r) {
+    return std::find(r.conditions.begin(), r.conditions.end(), *e.condition) != r.conditions.end();
+  };
+  if (e.condition && std::none_of(safety.actions.begin(), safety.actions.end(), saw))
+    complain(fmt::format("no action was decided while {} held", *e.condition));
+  const bool faulted = safety.first_fault_s >= 0.0;
+  if (!s.config.faults.empty() && !faulted) complain("its phase never came: no fault was injected");
+  if (e.within_s && faulted) {
+    // The first action after the fault.
+    const auto acted = std::find_if(safety.actions.begin(), safety.actions.end(),
+                                    [&](const auto& r) { return r.time_s >= safety.first_fault_s; });
+    const double after_s = acted == safety.actions.end() ? 1e9 : acted->time_s - safety.first_fault_s;
+    if (after_s > *e.within_s)
+      complain(acted == safety.actions.end()
+                   ? std::string("no action was taken after the fault")
+                   : fmt::format("the action came {:.3f} s after the fault, not within {} s", after_s,
+                                 *e.within_s));
+  }
+  if (e.motors_stop_within_s && faulted) {
+    const double after_s = safety.last_thrust_s - safety.first_fault_s;
+    if (after_s > *e.motors_stop_within_s)
+      complain(fmt::format("motors turned until {:.4f} s after the fault, not {} s at most", after_s,
+                           *e.motors_stop_within_s));
+  }
+  if (e.touchdown_mps && safety.touchdown_mps > *e.touchdown_mps)
+    complain(fmt::format("it touched down at {:.2f} m/s, not {} m/s at most", safety.touchdown_mps,
+                         *e.touchdown_mps));
+  if (e.home_within_m && !report.path.empty()) {
+    const Vector3 away = safety.end_W - report.path.front().p_WB;
+    const double away_m = Vector3(away.x(), away.y(), 0.0).norm();
+    if (away_m > *e.home_within_m)
+      complain(fmt::format("it ended {:.1f} m from home, not within {} m", away_m, *e.home_within_m));
+  }
+  if (e.landing_site_known && *e.landing_site_known != safety.landing_site_was_known)
+    complain(
+        fmt::format("the landing site was {}known to be free", safety.landing_site_was_known ? "" : "not "));
+  return complaints;
+}
+
+}  // namespace roborun::mission

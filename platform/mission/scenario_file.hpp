@@ -1,0 +1,48 @@
+/// One flight with faults in a TOML file: world, vehicle, sensors, weather, fence, time line, and what must
+/// come of it.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "platform/mission/mission.hpp"
+
+namespace roborun::mission {
+
+/// What must come of the flight. What is not there is not asked for; a collision, or the true position
+/// outside the fence, fails every scenario that does not name it as its outcome.
+struct Expectation {
+  std::string outcome;                         ///< The reason why the mission ended.
+  std::optional<std::string> action;           ///< The last one of the failsafe; "go_on": none was taken.
+  std::optional<std::string> condition;        ///< Held when an action was decided.
+  std::optional<double> within_s;              ///< From the first fault to the first action.
+  std::optional<double> motors_stop_within_s;  ///< From the first fault to the last thrust.
+  std::optional<double> touchdown_mps;         ///< At most.
+  std::optional<double> home_within_m;         ///< Where it ends, over ground.
+  std::optional<bool> landing_site_known;
+};
+
+struct Scenario {
+  std::string name;   ///< The file's name without folder and ending.
+  std::string about;  ///< One line.
+  std::string world;  ///< Path of a world file, or empty: `environment`.
+  std::string environment;
+  std::vector<sitl::Body> bodies;  ///< Besides those of the world.
+  MissionConfig config{};
+  Expectation expect{};
+};
+
+/// Tables [scenario] about, world (relative to this file) or environment, seed, design, answers, cost_factor
+/// (of computing, against the paper's machine); those of a
+/// settings file (settings_file.hpp); any number of [[fault]] with component, kind, instance, phase, at_s,
+/// for_s; [[body]] as in a world file (body_reader.hpp); [expect] with the fields above. Throws
+/// InputError with file, line, key and what would be right.
+[[nodiscard]] Scenario load_scenario(const std::string& path);
+/// Flies it. Throws InputError for a world that cannot be flown.
+[[nodiscard]] report::MissionReport fly_scenario(const Scenario& scenario);
+/// What was not as expected, one line each; empty: passed.
+[[nodiscard]] std::vector<std::string> complaints_of(const Scenario& scenario,
+                                                     const report::MissionReport& report);
+
+}  // namespace roborun::mission

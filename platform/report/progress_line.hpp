@@ -1,0 +1,31 @@
+/// A line on the terminal that is rewritten, or one line every ten seconds where there is no terminal.
+#pragma once
+
+#include <chrono>
+#include <string>
+
+namespace roborun::report {
+
+class ProgressLine {
+ public:
+  ProgressLine();
+  ~ProgressLine();
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
+  /// True if a call of show() now would be seen, so that nobody formats for nothing.
+  [[nodiscard]] bool due() const;
+  /// Writes the line to standard error.
+  void show(const std::string& text);
+  /// Wall time since this was made.
+  [[nodiscard]] double elapsed_s() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  bool terminal_;
+  bool shown_{false};
+  Clock::time_point start_;
+  Clock::time_point last_;
+};
+
+}  // namespace roborun::report

@@ -1,0 +1,72 @@
+/// The six simulated depth cameras of the vehicle: read where they stand, or served to another thread.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <span>
+#include <vector>
+
+#include "core/exchange/mailbox.hpp"
+#include "core/exchange/spsc_ring.hpp"
+#include "core/executive/lane_executive.hpp"
+#include "platform/sitl/aircraft/simulated_aircraft.hpp"
+#include "platform/sitl/sensors/depth_camera.hpp"
+
+namespace roborun::sitl {
+
+/// Lockstep: an exposure is taken at once, and rendered by whoever reads it.
+class CameraRig final : public ExposureSink {
+ public:
+  CameraRig(const World& world, const DepthCameraConfig& config, std::uint64_t seed);
+  void expose(MonotonicTime now, const Pose& X_WB) noexcept override;
+  /// In the order of the mounts.
+  [[nodiscard]] std::span<firmware_if::DepthCamera* const> cameras() noexcept { return cameras_; }
+
+ private:
+  std::vector<SimulatedDepthCamera> camera_;
+  std::vector<firmware_if::DepthCamera*> cameras_;
+};
+
+/// Real time: the flight lane leaves its pose in a ring, a slot of the background lane renders, and the
+/// decision lane finds each camera's newest image in a mailbox, as it would find a driver's.
+class CameraServer final : public ExposureSink, public core::LaneProgram {
+ public:
+  CameraServer(const World& world, const DepthCameraConfig& config, std::uint64_t seed);
+
+  void expose(MonotonicTime now, const Pose& X_WB) noexcept override { exposure_.push({now, X_WB}); }
+  void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override;
+  /// For the decision lane.
+  [[nodiscard]] std::span<firmware_if::DepthCamera* const> cameras() noexcept { return cameras_; }
+  /// Poses lost because the background lane did not keep up; never decreases.
+  [[nodiscard]] std::uint64_t exposures_dropped() const noexcept { return exposure_.dropped(); }
+  /// Least distance of the vehicle's centre to an obstacle so far, at most 2 m. Background lane's thread.
+  [[nodiscard]] double least_clearance_m() const noexcept { return least_clearance_m_; }
+  [[nodiscard]] const Vector3& last_p_WB() const noexcept { return last_p_WB_; }
+
+ private:
+  struct Exposure {
+    MonotonicTime now{};
+    Pose X_WB{};
+  };
+  struct Image {
+    firmware_if::DepthFrame frame{};
+    std::vector<float> depth_m;
+  };
+  class Served final : public firmware_if::DepthCamera {
+   public:
+    [[nodiscard]] Status read(firmware_if::DepthFrame& frame) noexcept override;
+    [[nodiscard]] const firmware_if::CameraMount& mount() const noexcept override { return mount_; }
+    core::Mailbox<Image> box;
+    firmware_if::CameraMount mount_;
+  };
+
+  const World& world_;
+  CameraRig rig_;
+  std::deque<Served> served_;
+  std::vector<firmware_if::DepthCamera*> cameras_;
+  core::SpscRing<Exposure, 2048> exposure_;
+  double least_clearance_m_{2.0};
+  Vector3 last_p_WB_ = Vector3::Zero();
+};
+
+}  // namespace roborun::sitl

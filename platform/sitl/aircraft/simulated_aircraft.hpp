@@ -1,0 +1,107 @@
+/// Vehicle, motors' bus and navigation sensors of a simulated flight, and who takes pictures on the way.
+#pragma once
+
+#include "platform/flight/actuator_side.hpp"
+#include "platform/flight/aircraft.hpp"
+#include "platform/sitl/aircraft/simulated_actuators.hpp"
+#include "platform/sitl/fault/faulty_sensors.hpp"
+#include "platform/sitl/sensors/depth_camera.hpp"
+#include "platform/sitl/sensors/navigation_sensors.hpp"
+#include "platform/sitl/vehicle/vehicle.hpp"
+
+namespace roborun::sitl {
+
+/// What is simulated, and how.
+struct SimulatorConfig {
+  DepthCameraConfig camera{};
+  NavigationSensorsConfig sensors{};
+  VehicleConfig vehicle{};
+  WindConfig wind{};
+};
+
+/// Told the true pose once a minor frame. Contract: expose() neither blocks nor allocates.
+class ExposureSink {
+ public:
+  virtual ~ExposureSink() = default;
+  virtual void expose(MonotonicTime now, const Pose& X_WB) noexcept = 0;
+};
+
+class SimulatedAircraft final : public flight::Aircraft {
+ public:
+  /// Stands on the ground at `ground_W`. `cameras` and what is outside must outlive it.
+  SimulatedAircraft(const SimulatorConfig& config, const Vector3& ground_W, std::uint64_t seed,
+                    Nanos minor_frame, ExposureSink& cameras, const OutsideActuators& outside = {})
+      : vehicle_(config.vehicle, config.wind, ground_W, seed),
+        sensors_(NavigationSensors(config.sensors, seed)),
+        cameras_(cameras),
+        far_side_(seed, outside),
+        actuators_(minor_frame, far_side_.bus(), far_side_.kill_open(), far_side_.kill_closed()),
+        minor_frame_(minor_frame) {}
+
+  /// All that can fail is connected to the line, which must outlive the aircraft.
+  void connect(const FaultLine& line) noexcept {
+    faults_ = &line;
+    sensors_.connect(&line);
+    far_side_.connect(&line);
+  }
+  /// A twin for tests: the kill switch has no effect.
+  void ignore_kill_switch() noexcept { actuators_.ignore_kill_switch(); }
+
+  /// Its time begins here.
+  void start(MonotonicTime now) noexcept { now_ = now; }
+  /// The world moves on in whole minor frames until `now`: more than one after frames that slipped, at most
+  /// 40 a call.
+  void begin_frame(MonotonicTime now) noexcept override {
+    for (int i = 0; i < 40 && now_ < now; ++i) {
+      // What was sent at the end of a minor frame reaches the motors in the middle of the next one: four
+      // throttles are on the bus for 0.13 ms, and an ESC has a cycle of its own.
+      vehicle_.step(minor_frame_ / 2);
+      far_side_.advance(now_ + minor_frame_ / 2, vehicle_.state().battery_ratio, vehicle_);
+      vehicle_.step(minor_frame_ / 2);
+      now_ += minor_frame_;
+      sensors_.sample(now_, vehicle_.state());
+      cameras_.expose(now_, vehicle_.X_WB());
+    }
+  }
+  [[nodiscard]] firmware_if::Imu& imu() noexcept override { return sensors_; }
+  [[nodiscard]] firmware_if::Gnss& gnss() noexcept override { return sensors_; }
+  [[nodiscard]] firmware_if::Barometer& barometer() noexcept override { return sensors_; }
+  [[nodiscard]] firmware_if::Motors& motors() noexcept override { return actuators_; }
+  [[nodiscard]] flight::AircraftHealth health(MonotonicTime now) noexcept override {
+    return {actuators_.charge_ratio(now), actuators_.esc_silence(now), hears_operator(),
+            actuators_.kill_switch().killed()};
+  }
+  void terminate() noexcept override { actuators_.terminate(); }
+  void disarm() noexcept override { actuators_.disarm(); }
+  void end_frame(MonotonicTime now) noexcept override {
+    far_side_.break_lines(now);
+    actuators_.step(now);
+  }
+
+  [[nodiscard]] const Vehicle& vehicle() const noexcept { return vehicle_; }
+  [[nodiscard]] const flight::ActuatorSide& actuators() const noexcept { return actuators_; }
+  [[nodiscard]] const SimulatedActuators& far_side() const noexcept { return far_side_; }
+  void set_mean_wind(const Vector3& mean_W_mps) noexcept { vehicle_.set_mean_wind(mean_W_mps); }
+
+ private:
+  [[nodiscard]] FaultKind fault_of(Component component) const noexcept {
+    return faults_ != nullptr ? faults_->of(component) : FaultKind::kNone;
+  }
+  /// The simulator's operator always is heard, unless the link has a fault.
+  [[nodiscard]] bool hears_operator() const noexcept {
+    const FaultKind kind = fault_of(Component::kLink);
+    return kind == FaultKind::kNone ||
+           (kind == FaultKind::kIntermittent && now_.time_since_epoch() / minor_frame_ % 2 == 0);
+  }
+
+  Vehicle vehicle_;
+  FaultySensors sensors_;
+  ExposureSink& cameras_;
+  SimulatedActuators far_side_;
+  flight::ActuatorSide actuators_;
+  Nanos minor_frame_;
+  MonotonicTime now_{};
+  const FaultLine* faults_{nullptr};
+};
+
+}  // namespace roborun::sitl

@@ -1,0 +1,44 @@
+#include "platform/mission/settings_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include "platform/input/input_error.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace roborun::mission {
+namespace {
+
+TEST(Settings, OverwritesWhatIsThereAndKeepsTheRest) {
+  MissionConfig config;
+  load_settings(test::scratch_file("settings.toml",
+                                   "[camera]\npixels = 64\nrange_m = 18.5\n[wind]\nmean_mps = [4, 0, 0]\n"),
+                config);
+  EXPECT_EQ(config.simulator.camera.pixels, 64);
+  EXPECT_EQ(config.simulator.camera.range_m, 18.5);
+  EXPECT_EQ(config.simulator.camera.rate_Hz, sitl::DepthCameraConfig{}.rate_Hz);
+  EXPECT_EQ(config.simulator.wind.mean_W_mps, Vector3(4.0, 0.0, 0.0));
+  EXPECT_EQ(config.simulator.wind.gust_mps, sitl::WindConfig{}.gust_mps);
+}
+
+TEST(Settings, RefusesWithFileLineKeyAndRange) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"[camera]\nrange_m = 1000\n", ":2: range_m: must be a number from 5 to 100"},
+      {"[camera]\nrange = 10\n", ":2: range: unknown key in [camera]"},
+      {"[wind]\nmean_mps = [30, 0, 0]\n", ":2: mean_mps: must be at most 20 m/s"},
+      {"[engine]\n", "engine: unknown key in the file"},
+      {"camera = 3\n", ":1: camera: must be a table"},
+      {"[flight]\nv_max_mps = nan\n", ":2: v_max_mps: must be a number"},
+  };
+  for (const auto& [text, says] : cases) {
+    MissionConfig config;
+    try {
+      load_settings(test::scratch_file("bad.toml", text), config);
+      ADD_FAILURE() << text;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(says), std::string::npos) << error.what();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace roborun::mission
