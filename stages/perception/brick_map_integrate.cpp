@@ -44,7 +44,7 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
       continue;
     }
     cameras_.camera[cameras_.count].prepare(posed, *image,
-                                            {config_.depth_margin_m, config_.depth_margin_per_m});
+                                            {config_.depth_margin_m, config_.depth_margin_quadratic_per_m});
     frame_of_[cameras_.count++] = i;
   }
   counters_.frames_refused += result.frames_refused;

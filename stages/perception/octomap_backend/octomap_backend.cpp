@@ -11,7 +11,7 @@
 
 #include "core/precision.hpp"
 #include "core/record/state_hash.hpp"
-#include "stages/perception/depth_pyramid.hpp"
+#include "stages/perception/depth_steps.hpp"
 #include "stages/perception/frame_guard.hpp"
 
 namespace roborun::stages {
