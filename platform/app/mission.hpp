@@ -43,7 +43,7 @@ struct MissionConfig {
   governor::Design design{governor::Design::kAware};
   std::string profile_name{"paper"};
   core::CostProfile costs{};
-  std::array<governor::LatencyModel, 3> model{};
+  governor::KnobArray<governor::LatencyModel> model{};
   std::uint64_t seed{1};
   std::string map_backend{"own"};      ///< "own" or "octomap".
   std::string planner_backend{"own"};  ///< "own" or "ompl:NAME".
