@@ -13,6 +13,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 
@@ -86,7 +87,7 @@ class BrickMap final : public OccupancyMap, private MapView {
     return box_free(box_W, view_level_, view_radius_m_, lookups);
   }
   [[nodiscard]] bool is_free_at_finest(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
-    return box_free(box_W, 0, 1e18, lookups);
+    return box_free(box_W, 0, std::numeric_limits<double>::infinity(), lookups);
   }
   [[nodiscard]] CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept override;
   [[nodiscard]] double cell_m() const noexcept override { return cell_size_m(view_level_); }
