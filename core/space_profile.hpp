@@ -16,16 +16,15 @@ struct TrajectoryOutlook {
 struct SpaceProfile {
   static constexpr std::size_t kMaxOutlook = 32;
 
-  double gap_average_m{};       ///< Mean gap between neighbouring obstacles in view; +inf if fewer than two.
-  double gap_min_m{};           ///< Smallest such gap that the vehicle fits through; +inf if none.
-  double closest_obstacle_m{};  ///< Distance from the vehicle's centre to the nearest surface; +inf if none
-                                ///< in view.
-  double obstacle_ahead_m{};    ///< The same within 45 degrees of the way to the goal; 0 if not all was seen.
-  double closest_unknown_m{};  ///< Visibility d: free distance ahead along the motion (or towards the goal at
-                               ///< rest).
-  double sensor_volume_m3{};   ///< Space that the depth images of this decision see.
-  double map_volume_m3{};      ///< Known space (free or occupied) in the map.
-  double speed_mps{};          ///< |v_WB| of the vehicle now.
+  double gap_average_m{};  ///< Mean gap between neighbouring obstacles in view; +inf if fewer than two.
+  /// Distance from the vehicle's centre to the nearest surface; +inf if none in view.
+  double closest_obstacle_m{};
+  double obstacle_ahead_m{};  ///< The same within 45 degrees of the way to the goal; 0 if not all was seen.
+  /// Visibility d: free distance ahead along the motion (or towards the goal at rest).
+  double closest_unknown_m{};
+  double sensor_volume_m3{};  ///< Space that the depth images of this decision see.
+  double map_volume_m3{};     ///< Known space (free or occupied) in the map.
+  double speed_mps{};         ///< |v_WB| of the vehicle now.
   std::array<TrajectoryOutlook, kMaxOutlook> outlook{};
   std::size_t outlook_count{};
 };

@@ -17,6 +17,10 @@ struct TrajectoryPoint {
   Vector3 j_W = Vector3::Zero();
 };
 
+[[nodiscard]] inline bool is_finite(const TrajectoryPoint& point) noexcept {
+  return is_finite(point.p_W) && is_finite(point.v_W) && is_finite(point.a_W) && is_finite(point.j_W);
+}
+
 /// One polynomial of degree 9 on [0, duration_s]; coefficient[k] multiplies t^k.
 struct PolynomialSegment {
   static constexpr std::size_t kCoefficients = 10;
@@ -40,8 +44,8 @@ class Trajectory {
   static constexpr std::size_t kMaxSegments = 48;
 
   MonotonicTime start_time{};
-  double brake_begin_s{};  ///< From start_time: where the final braking tail begins; duration_s() if there is
-                           ///< none.
+  /// From start_time: where the final braking tail begins; duration_s() if there is none.
+  double brake_begin_s{};
   std::size_t segment_count{};
   std::array<PolynomialSegment, kMaxSegments> segment{};
   Vector3 hold_W = Vector3::Zero();

@@ -38,59 +38,71 @@ std::uint8_t TransmitGate::priority_of(const dronecan::DataType& type) noexcept 
   return dronecan::kLowestPriority;
 }
 
-Status TransmitGate::send(const dronecan::TransferHeader& header, std::span<const std::uint8_t> payload,
-                          MonotonicTime now) noexcept {
-  using dronecan::TransferKind;
+const TransmitRule* TransmitGate::rule_for(const dronecan::TransferHeader& header,
+                                           std::size_t payload_bytes) const noexcept {
   const auto rule = std::ranges::find_if(kTransmitRules, [&](const TransmitRule& r) {
     return r.type.kind == header.kind && r.type.id == header.data_type_id && r.priority == header.priority;
   });
-  const bool response = header.kind == TransferKind::kResponse;
+  const bool response = header.kind == dronecan::TransferKind::kResponse;
   const bool anonymous = header.data_type_id == dronecan::kType<dronecan::Allocation>.id && !response;
   // An allocation request leaves only without a node id, everything else only with one.
-  if (rule == kTransmitRules.end() || anonymous != (node_id_ == 0) ||
-      response != (header.destination_node_id != 0) || payload.size() > rule->type.max_payload_bytes) {
-    ++counters_.refused;
-    return Status::kInvalidArgument;
+  const bool allowed = rule != kTransmitRules.end() && anonymous == (node_id_ == 0) &&
+                       response == (header.destination_node_id != 0) &&
+                       payload_bytes <= rule->type.max_payload_bytes;
+  return allowed ? &*rule : nullptr;
+}
+
+Status TransmitGate::make_safe(const TransmitRule& rule, MonotonicTime now, Outgoing& out) noexcept {
+  if (rule.type.id == dronecan::kType<dronecan::EscRawCommand>.id) {
+    const Status status = make_throttles_safe(out.payload, now, out.throttles);
+    auto size = dronecan::encode(out.throttles, out.throttle_payload);
+    out.payload = std::span<const std::uint8_t>(out.throttle_payload).first(size.ok() ? size.value() : 0);
+    return status;
   }
-  RuleState& state = states_[static_cast<std::size_t>(rule - kTransmitRules.begin())];
+  if (rule.type.id != dronecan::kType<dronecan::HardpointCommand>.id) return Status::kOk;
+  dronecan::HardpointCommand command;
+  const Status status = dronecan::decode(out.payload, command);
+  if (status != Status::kOk) return status;
+  const bool drops = command.command == kRelease && (!release_allowed_ || killed_);
+  return drops ? Status::kInvalidArgument : Status::kOk;
+}
+
+Status TransmitGate::refuse(Status why) noexcept {
+  ++counters_.refused;
+  return why;
+}
+
+Status TransmitGate::send(const dronecan::TransferHeader& header, std::span<const std::uint8_t> payload,
+                          MonotonicTime now) noexcept {
+  // 1. On the list, and not too soon.
+  const TransmitRule* rule = rule_for(header, payload.size());
+  if (rule == nullptr) return refuse(Status::kInvalidArgument);
+  RuleState& state = states_[static_cast<std::size_t>(rule - kTransmitRules.data())];
   if (state.used && now - state.last < rule->shortest_interval) {
     ++counters_.too_soon;
     return Status::kNotReady;
   }
 
-  dronecan::EscRawCommand safe;
-  std::array<std::uint8_t, dronecan::kMaxPayload_bytes<dronecan::EscRawCommand>> safe_payload{};
-  Status form = Status::kOk;
-  if (rule->type.id == dronecan::kType<dronecan::EscRawCommand>.id) {
-    form = make_throttles_safe(payload, now, safe);
-    auto size = dronecan::encode(safe, safe_payload);
-    payload = std::span<const std::uint8_t>(safe_payload).first(size.ok() ? size.value() : 0);
-  } else if (rule->type.id == dronecan::kType<dronecan::HardpointCommand>.id) {
-    dronecan::HardpointCommand command;
-    form = dronecan::decode(payload, command);
-    if (form == Status::kOk && command.command == kRelease && (!release_allowed_ || killed_))
-      form = Status::kInvalidArgument;
-  }
-  if (form != Status::kOk) {
-    ++counters_.refused;
-    return form;
-  }
+  // 2. Of its form, and safe.
+  Outgoing safe{payload, {}, {}};
+  const Status form = make_safe(*rule, now, safe);
+  if (form != Status::kOk) return refuse(form);
 
+  // 3. Into frames.
   dronecan::TransferHeader out = header;
   out.source_node_id = node_id_;
-  if (!response) out.transfer_id = state.transfer_id;
-  auto count = dronecan::split(out, rule->type.signature, payload, now, frames_);
-  if (!count.ok()) {
-    ++counters_.refused;
-    return count.status();
-  }
-  // The id is spent even if the bus refuses, so that no receiver takes the next one for a repetition.
+  if (header.kind != dronecan::TransferKind::kResponse) out.transfer_id = state.transfer_id;
+  auto count = dronecan::split(out, rule->type.signature, safe.payload, now, frames_);
+  if (!count.ok()) return refuse(count.status());
+
+  // 4. Onto the bus. The id is spent even if the bus refuses, so that no receiver takes the next one for a
+  // repetition.
   state.transfer_id = static_cast<std::uint8_t>((state.transfer_id + 1U) % 32U);
   state.used = true;
   state.last = now;
   const Status status = bus_.send(std::span<const CanFrame>(frames_).first(count.value()));
   ++(status == Status::kOk ? counters_.sent : counters_.no_room);
-  if (status == Status::kOk) std::ranges::copy(safe.cmd.view(), throttle_.begin());
+  if (status == Status::kOk) std::ranges::copy(safe.throttles.cmd.view(), throttle_.begin());
   return status;
 }
 

@@ -98,7 +98,20 @@ class TransmitGate {
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 
  private:
+  /// A payload on its way out. Throttles are encoded anew, so `payload` then refers to `throttle_payload`.
+  struct Outgoing {
+    std::span<const std::uint8_t> payload;
+    dronecan::EscRawCommand throttles;
+    std::array<std::uint8_t, dronecan::kMaxPayload_bytes<dronecan::EscRawCommand>> throttle_payload;
+  };
+
   [[nodiscard]] static std::uint8_t priority_of(const dronecan::DataType& type) noexcept;
+  /// The rule by which this transfer may leave; nullptr if there is none.
+  [[nodiscard]] const TransmitRule* rule_for(const dronecan::TransferHeader& header,
+                                             std::size_t payload_bytes) const noexcept;
+  /// Replaces throttles by safe ones, and refuses a release that is not allowed.
+  [[nodiscard]] Status make_safe(const TransmitRule& rule, MonotonicTime now, Outgoing& out) noexcept;
+  [[nodiscard]] Status refuse(Status why) noexcept;
   [[nodiscard]] Status make_throttles_safe(std::span<const std::uint8_t> payload, MonotonicTime now,
                                            dronecan::EscRawCommand& safe) noexcept;
 

@@ -31,19 +31,17 @@ CostProfile paper_profile() noexcept {
   constexpr double kPerVolume = 1e-4;
 
   CostProfile profile;
-  const auto at = [&profile](StageId id) -> StageCost& {
-    return profile.stage[static_cast<std::size_t>(id)];
-  };
-  at(StageId::kPointCloud).fixed_s.fill(0.21 + 0.07 + 0.09);
-  at(StageId::kGovernor).fixed_s.fill(0.10);
-  at(StageId::kSmoother).fixed_s.fill(0.01);
+  StageArray<StageCost>& stage = profile.stage;
+  stage[StageId::kPointCloud].fixed_s.fill(0.21 + 0.07 + 0.09);
+  stage[StageId::kGovernor].fixed_s.fill(0.10);
+  stage[StageId::kSmoother].fixed_s.fill(0.01);
   double planner_s = kPlannerFinest_s;
   for (std::size_t level = 0; level < kPrecisionLevels; ++level, planner_s *= kPlannerPerOctave) {
-    at(StageId::kMap).fixed_s[level] = kHandOver_s[level];
-    at(StageId::kExport).fixed_s[level] = kHandOver_s[level];
-    at(StageId::kMap).per_m3_s[level] = kPerVolume * kMap_s[level];
-    at(StageId::kExport).per_m3_s[level] = kPerVolume * kExport_s[level];
-    at(StageId::kPlanner).per_m3_s[level] = kPerVolume * planner_s;
+    stage[StageId::kMap].fixed_s[level] = kHandOver_s[level];
+    stage[StageId::kExport].fixed_s[level] = kHandOver_s[level];
+    stage[StageId::kMap].per_m3_s[level] = kPerVolume * kMap_s[level];
+    stage[StageId::kExport].per_m3_s[level] = kPerVolume * kExport_s[level];
+    stage[StageId::kPlanner].per_m3_s[level] = kPerVolume * planner_s;
   }
   return profile;
 }

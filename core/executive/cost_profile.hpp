@@ -21,9 +21,9 @@ struct StageCost {
 [[nodiscard]] StageCost slower(const StageCost& cost, double factor) noexcept;
 
 struct CostProfile {
-  std::array<StageCost, kStageCount> stage{};
+  StageArray<StageCost> stage{};
 
-  [[nodiscard]] const StageCost& of(StageId id) const noexcept { return stage[static_cast<std::size_t>(id)]; }
+  [[nodiscard]] const StageCost& of(StageId id) const noexcept { return stage[id]; }
   /// Never negative; a level out of range is clamped. RT-safe: O(1).
   [[nodiscard]] Nanos cost(StageId id, const Work& work) const noexcept;
 };
@@ -34,20 +34,5 @@ struct CostProfile {
 /// (printed: 0.05), and each of the two hand-overs between machines 0.25 s at 0.3 m down to 0.01 s: one is
 /// charged to the map, one to the export.
 [[nodiscard]] CostProfile paper_profile() noexcept;
-
-/// Grants a stage a fixed amount of virtual time.
-class VirtualBudget final : public StageBudget {
- public:
-  VirtualBudget(const CostProfile& profile, StageId id, Nanos granted) noexcept
-      : profile_(profile), id_(id), granted_(granted) {}
-  [[nodiscard]] bool spent(const Work& done) noexcept override {
-    return profile_.cost(id_, done) >= granted_;
-  }
-
- private:
-  const CostProfile& profile_;
-  StageId id_;
-  Nanos granted_;
-};
 
 }  // namespace roborun::core

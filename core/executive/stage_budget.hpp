@@ -5,11 +5,17 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/memory/enum_array.hpp"
+
 namespace roborun::core {
 
 /// The stages of the decision lane, in the order in which they run.
 enum class StageId : std::uint8_t { kPointCloud, kGovernor, kMap, kExport, kPlanner, kSmoother };
 inline constexpr std::size_t kStageCount = 6;
+
+/// One value per stage.
+template <typename T>
+using StageArray = EnumArray<StageId, T, kStageCount>;
 
 [[nodiscard]] constexpr const char* to_string(StageId id) noexcept {
   switch (id) {
@@ -41,7 +47,7 @@ struct Work {
 /// Contract:
 ///  1. spent() neither blocks nor allocates, and once true stays true for the rest of the step.
 ///  2. A stage polls at least every 1,024 units of work, and returns its best so far as soon as it reads
-///  true.
+///     true.
 /// Flight reads a clock here; simulation asks the cost profile what the work would have cost on the board.
 class StageBudget {
  public:

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/geometry/inverse.hpp"
 
@@ -49,7 +50,7 @@ LatencyModel fit_latency(std::span<const LatencyPoint> points) noexcept {
     count += 1.0;
   }
   Terms best = Terms::Zero();
-  double best_cost = 1e300;
+  double best_cost = std::numeric_limits<double>::infinity();
   for (unsigned set = 1; set < (1U << kTerms); ++set) {
     // Scaled to unit diagonal: the features differ by ten orders of magnitude.
     Normal A = Normal::Identity();

@@ -6,6 +6,7 @@
 
 #include "core/executive/cost_profile.hpp"
 #include "core/precision.hpp"
+#include "governor/models/knob.hpp"
 
 namespace roborun::governor {
 

@@ -15,12 +15,27 @@ constexpr double kAwareV0_m3 = 60e3;
 constexpr double kAwareV1_m3 = 1e6;
 constexpr double kStaticSpeed_mps = 0.5;
 
-constexpr std::array<core::StageId, 3> kKnobStage{core::StageId::kMap, core::StageId::kExport,
-                                                  core::StageId::kPlanner};
-
-constexpr std::size_t index(core::StageId id) noexcept { return static_cast<std::size_t>(id); }
+double sum(const core::StageArray<double>& stage_s) noexcept {
+  double total_s = 0.0;
+  for (const double s : stage_s) total_s += s;
+  return total_s;
+}
 
 }  // namespace
+
+/// What one call of decide() works on.
+struct Governor::Task {
+  const SpaceProfile& profile;
+  const Situation& situation;
+  double overhead_s;
+  double see_m3;  ///< What the images of this decision see.
+};
+
+/// The levels of p0 that the solver may choose from, and what there is time for.
+struct Governor::Precision {
+  int finest, coarsest;
+  double share;  ///< Of what is in view, what can be perceived before the deadline. [0, 1]
+};
 
 const char* to_string(Design design) noexcept {
   switch (design) {
@@ -62,17 +77,18 @@ Governor::Governor(const GovernorConfig& config) noexcept : config_(config) {
       break;
     case Design::kStaticFair: {
       const double reach_m3 = config.sensor_volume_max_m3;
-      const double latency_s =
-          config.point_cloud_s + config.smoother_s + predicted_s(0, 0, std::min(kStaticV0_m3, reach_m3)) +
-          predicted_s(1, 0, kStaticV1_m3) + predicted_s(2, 0, std::min(kStaticV2_m3, reach_m3));
+      const double latency_s = config.point_cloud_s + config.smoother_s +
+                               predicted_s(Knob::kPerceive, 0, std::min(kStaticV0_m3, reach_m3)) +
+                               predicted_s(Knob::kExport, 0, kStaticV1_m3) +
+                               predicted_s(Knob::kPlan, 0, std::min(kStaticV2_m3, reach_m3));
       v_max_mps_ = std::min(config.v_max_mps, safe_speed_mps(config.design_visibility_m, latency_s));
       break;
     }
   }
 }
 
-double Governor::predicted_s(std::size_t stage, int level, double volume_m3) const noexcept {
-  return scale(kKnobStage[stage]) * config_.model[stage].latency_s(level, volume_m3);
+double Governor::predicted_s(Knob knob, int level, double volume_m3) const noexcept {
+  return scale(stage_of(knob)) * config_.model[knob].latency_s(level, volume_m3);
 }
 
 double Governor::overhead_s() const noexcept {
@@ -82,7 +98,7 @@ double Governor::overhead_s() const noexcept {
 }
 
 void Governor::observe(core::StageId id, double predicted_s, double spent_s) noexcept {
-  scale_[index(id)].observe(predicted_s / scale(id), spent_s);
+  scale_[id].observe(predicted_s / scale(id), spent_s);
 }
 
 double Governor::safe_speed_mps(double visible_m, double latency_s) const noexcept {
@@ -100,13 +116,12 @@ Nanos Governor::whole_frames(double time_s) const noexcept {
 }
 
 void Governor::fill_prediction(Decision& d) const noexcept {
-  d.predicted_s[index(core::StageId::kPointCloud)] =
-      scale(core::StageId::kPointCloud) * config_.point_cloud_s;
-  d.predicted_s[index(core::StageId::kGovernor)] = scale(core::StageId::kGovernor) * config_.governor_s;
-  d.predicted_s[index(core::StageId::kMap)] = predicted_s(0, d.solution.p0_level, d.solution.v0_m3);
-  d.predicted_s[index(core::StageId::kExport)] = predicted_s(1, d.solution.p1_level, d.solution.v1_m3);
-  d.predicted_s[index(core::StageId::kPlanner)] = predicted_s(2, d.solution.p1_level, d.solution.v2_m3);
-  d.predicted_s[index(core::StageId::kSmoother)] = scale(core::StageId::kSmoother) * config_.smoother_s;
+  d.predicted_s[core::StageId::kPointCloud] = scale(core::StageId::kPointCloud) * config_.point_cloud_s;
+  d.predicted_s[core::StageId::kGovernor] = scale(core::StageId::kGovernor) * config_.governor_s;
+  d.predicted_s[core::StageId::kMap] = predicted_s(Knob::kPerceive, d.solution.p0_level, d.solution.v0_m3);
+  d.predicted_s[core::StageId::kExport] = predicted_s(Knob::kExport, d.solution.p1_level, d.solution.v1_m3);
+  d.predicted_s[core::StageId::kPlanner] = predicted_s(Knob::kPlan, d.solution.p1_level, d.solution.v2_m3);
+  d.predicted_s[core::StageId::kSmoother] = scale(core::StageId::kSmoother) * config_.smoother_s;
 }
 
 Decision Governor::decide_static(const SpaceProfile& profile) const noexcept {
@@ -118,8 +133,7 @@ Decision Governor::decide_static(const SpaceProfile& profile) const noexcept {
   d.solution.v1_m3 = std::min(kStaticV1_m3, profile.map_volume_m3);
   d.solution.v2_m3 = std::min(kStaticV2_m3, config_.sensor_volume_max_m3);
   fill_prediction(d);
-  double total_s = 0.0;
-  for (const double s : d.predicted_s) total_s += s;
+  const double total_s = sum(d.predicted_s);
   d.point = {0,
              0,
              kStaticV0_m3,
@@ -132,105 +146,150 @@ Decision Governor::decide_static(const SpaceProfile& profile) const noexcept {
   return d;
 }
 
-Decision Governor::decide(const SpaceProfile& profile, const Situation& situation) noexcept {
-  if (config_.design != Design::kAware) return decide_static(profile);
+int Governor::finer_levels(const Situation& situation) const noexcept {
+  return std::max(situation.failures - config_.policy.failures_until_finer + 1, 0);
+}
+
+bool Governor::near_goal(const Situation& situation) const noexcept {
+  return situation.distance_to_goal_m < config_.policy.near_goal_m;
+}
+
+/// Eq. 4 summed over the stages, with all volumes a share of what is in view (the planner explores only its
+/// own share of that), and the reserve on top.
+double Governor::needed_s(const Task& task, int level, double share) const noexcept {
+  return (task.overhead_s + predicted_s(Knob::kPerceive, level, share * task.see_m3) +
+          predicted_s(Knob::kExport, level, share * task.see_m3) +
+          predicted_s(Knob::kPlan, level, share * config_.policy.planner_share * task.see_m3)) *
+         (1.0 + config_.policy.reserve_ratio);
+}
+
+/// Step 1: how precisely must we look? An obstacle grows by up to a cell, and so does the vehicle's box, on
+/// either side of a gap: a gap of width g loses up to four cells, so it is passable for certain on cells of
+///   (g - width) / 4
+/// and `cells_to_obstacle` cells must fit between the vehicle and the nearest obstacle. Then the policy:
+/// coarser only step by step, finer after failures, and at most 0.6 m near the goal and on the climb.
+int Governor::asked_level(const Task& task, Decision& d) const noexcept {
   const Policy& policy = config_.policy;
-  Decision d;
+  const double gap_cell_m = 0.25 * (task.profile.gap_average_m - config_.vehicle_width_m);
+  d.demand_m = std::fmin(gap_cell_m, task.profile.closest_obstacle_m / policy.cells_to_obstacle);
+  int level = std::min(coarsest_level_within(d.demand_m), config_.coarsest_level);
+  level = std::min(level, last_level_ + policy.coarser_levels_per_decision);
+  level = std::max(level - finer_levels(task.situation), 0);
+  if (near_goal(task.situation) || task.situation.surveying) level = std::min(level, 1);
+  return level;
+}
 
-  // 1. How precisely must we look? An obstacle grows by up to a cell, and so does the vehicle's box, on
-  // either side of a gap: of width g it is passable for certain on cells of (g - width) / 4.
-  const double gap_cell_m = 0.25 * (profile.gap_average_m - config_.vehicle_width_m);
-  d.demand_m = std::fmin(gap_cell_m, profile.closest_obstacle_m / policy.cells_to_obstacle);
-  int coarsest = std::min(coarsest_level_within(d.demand_m), config_.coarsest_level);
-  coarsest = std::min(coarsest, last_level_ + policy.coarser_levels_per_decision);
-  const int extra = std::max(situation.failures - policy.failures_until_finer + 1, 0);
-  coarsest = std::max(coarsest - extra, 0);
-  const bool near_goal = situation.distance_to_goal_m < policy.near_goal_m;
-  if (near_goal || situation.surveying) coarsest = std::min(coarsest, 1);
-  const double overhead = overhead_s();
-  const double see_m3 = profile.sensor_volume_m3 > 0.0 ? profile.sensor_volume_m3 : 0.0;  // NaN: nothing
-  const auto needed_s = [&](int level, double share) {
-    return (overhead + predicted_s(0, level, share * see_m3) + predicted_s(1, level, share * see_m3) +
-            predicted_s(2, level, share * policy.planner_share * see_m3)) *
-           (1.0 + policy.reserve_ratio);
-  };
-
-  // 2. How long may we think? As long as is safe, but no longer than is useful.
+/// Step 2: how long may we think? As long as is safe, but no longer than is useful:
+///   safe     the time budget of the trajectory (Algorithm 1; Eq. 1 without one) / decisions_per_budget
+///   useful   `longest`, or what the precision that the space asks for takes, if that is more
+/// and never shorter than `shortest`.
+double Governor::deadline_s(const Task& task, int asked_level, Decision& d) const noexcept {
+  const Policy& policy = config_.policy;
+  const SpaceProfile& profile = task.profile;
   const BudgetLimits limits{policy.shortest, policy.longest_budget};
-  const bool has_outlook = profile.outlook_count > 0;
-  d.time_budget =
-      has_outlook
-          ? trajectory_budget({profile.outlook.data(), profile.outlook_count}, config_.stopping, limits)
-          : time_budget(profile.closest_unknown_m, profile.speed_mps, config_.stopping, limits);
-  d.source = has_outlook ? BudgetSource::kTrajectory : BudgetSource::kVisibility;
-  if (situation.surveying) d.time_budget = policy.longest_budget;
+  if (profile.outlook_count > 0) {
+    d.time_budget =
+        trajectory_budget({profile.outlook.data(), profile.outlook_count}, config_.stopping, limits);
+    d.source = BudgetSource::kTrajectory;
+  } else {
+    d.time_budget = time_budget(profile.closest_unknown_m, profile.speed_mps, config_.stopping, limits);
+    d.source = BudgetSource::kVisibility;
+  }
+  if (task.situation.surveying) d.time_budget = policy.longest_budget;
   double deadline_s = seconds(d.time_budget) / policy.decisions_per_budget;
-  const Nanos longest = situation.motion ? policy.shortest : policy.longest;
-  const double useful_s = std::max(seconds(longest), needed_s(coarsest, 1.0));
+  const Nanos longest = task.situation.motion ? policy.shortest : policy.longest;
+  const double useful_s = std::max(seconds(longest), needed_s(task, asked_level, 1.0));
   if (deadline_s >= useful_s) {
     deadline_s = useful_s;
-    d.source = extra > 0 ? BudgetSource::kFailures : BudgetSource::kLongest;
+    d.source = finer_levels(task.situation) > 0 ? BudgetSource::kFailures : BudgetSource::kLongest;
   }
   if (deadline_s < seconds(policy.shortest)) {
     deadline_s = seconds(policy.shortest);
     d.source = BudgetSource::kShortest;
   }
+  return deadline_s;
+}
 
-  // Time wins over precision: the deadline belongs to physics. Coarser until all that is in view can be
-  // processed in time.
-  while (coarsest < config_.coarsest_level && needed_s(coarsest, 1.0) > deadline_s) ++coarsest;
-  // Finer than asked for only where perception leaves the planner its share; otherwise perception is cut to
-  // it.
-  int finest = 0;
-  while (finest < coarsest && needed_s(finest, 1.0) > deadline_s) ++finest;
-  const double none_s = needed_s(coarsest, 0.0);
-  const double all_s = needed_s(coarsest, 1.0);
-  const double share = all_s > deadline_s ? std::max(deadline_s - none_s, 0.0) / (all_s - none_s) : 1.0;
+/// Step 3: time wins over precision, for the deadline belongs to physics.
+///  a. Coarser than asked for, until all that is in view can be processed in time.
+///  b. Finer than asked for only where perception leaves the planner its share.
+///  c. If even the coarsest level is too slow, only a share x of the view is perceived. Latency is linear in
+///     volume, so none + x (all - none) = deadline gives x = (deadline - none) / (all - none).
+Governor::Precision Governor::in_time(const Task& task, int asked_level, double deadline_s) const noexcept {
+  Precision result{0, asked_level, 1.0};
+  while (result.coarsest < config_.coarsest_level && needed_s(task, result.coarsest, 1.0) > deadline_s)
+    ++result.coarsest;
+  while (result.finest < result.coarsest && needed_s(task, result.finest, 1.0) > deadline_s) ++result.finest;
+  const double none_s = needed_s(task, result.coarsest, 0.0);
+  const double all_s = needed_s(task, result.coarsest, 1.0);
+  if (all_s > deadline_s) result.share = std::max(deadline_s - none_s, 0.0) / (all_s - none_s);
+  return result;
+}
 
-  // 3. The operating point. In the open there is nothing to search for.
+/// Step 4: the instance of Eq. 3. The reserve and the stages without knobs come off the deadline; the models
+/// are scaled by what the stages really took of late.
+SolverProblem Governor::problem_of(const Task& task, const Precision& precision, double deadline_s,
+                                   double plan_m3) const noexcept {
+  const SpaceProfile& profile = task.profile;
+  SolverProblem p;
+  p.delta_d_s = deadline_s * (1.0 - config_.policy.reserve_ratio) - task.overhead_s;
+  p.model = config_.model;
+  for (const Knob knob : kKnobs) {
+    for (double& s : p.model[knob].fixed_s) s *= scale(stage_of(knob));
+    for (double& s : p.model[knob].slope_s_per_m3) s *= scale(stage_of(knob));
+  }
+  p.g_min_m = cell_size_m(precision.finest);
+  p.g_avg_m = cell_size_m(precision.coarsest);
+  p.d_obs_m = std::fmax(profile.closest_obstacle_m, cell_size_m(precision.coarsest));
+  p.p1_coarsest_level = precision.coarsest;
+  p.v_sensor_m3 = task.see_m3;
+  p.v_map_m3 = profile.map_volume_m3 > 0.0 ? profile.map_volume_m3 : 0.0;
+  p.v0_max_m3 = std::min(kAwareV0_m3, precision.share * task.see_m3);
+  p.v1_max_m3 = kAwareV1_m3;
+  p.v2_max_m3 = plan_m3;
+  return p;
+}
+
+/// Step 6: how fast may the next trajectory be? As fast as it can still stop inside known free space, which
+/// the smoother sees to.
+double Governor::speed_limit_mps(const Situation& situation) const noexcept {
+  double speed_mps = v_max_mps_;
+  if (near_goal(situation)) speed_mps = std::min(speed_mps, config_.policy.near_goal_speed_mps);
+  if (situation.motion) speed_mps = std::min(speed_mps, config_.policy.motion_speed_mps);
+  return speed_mps;
+}
+
+Decision Governor::decide(const SpaceProfile& profile, const Situation& situation) noexcept {
+  if (config_.design != Design::kAware) return decide_static(profile);
+  const Policy& policy = config_.policy;
+  const double see_m3 = profile.sensor_volume_m3 > 0.0 ? profile.sensor_volume_m3 : 0.0;  // NaN: nothing
+  const Task task{profile, situation, overhead_s(), see_m3};
+  Decision d;
+  const int asked = asked_level(task, d);                    // 1
+  double time_s = deadline_s(task, asked, d);                // 2
+  const Precision precision = in_time(task, asked, time_s);  // 3
+
+  // 4. In the open there is nothing to search for.
   d.open = situation.straight && situation.failures == 0 && !situation.motion &&
            profile.obstacle_ahead_m == std::numeric_limits<double>::infinity();
   const double share_m3 = policy.planner_share * see_m3;
   const double plan_m3 = d.open ? std::min(policy.open_planner_m3, share_m3) : share_m3;
-  SolverProblem& p = d.problem;
-  p.delta_d_s = deadline_s * (1.0 - policy.reserve_ratio) - overhead;
-  p.model = config_.model;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (double& s : p.model[i].fixed_s) s *= scale(kKnobStage[i]);
-    for (double& s : p.model[i].slope_s_per_m3) s *= scale(kKnobStage[i]);
-  }
-  p.g_min_m = cell_size_m(finest);
-  p.g_avg_m = cell_size_m(coarsest);
-  p.d_obs_m = std::fmax(profile.closest_obstacle_m, cell_size_m(coarsest));
-  p.p1_coarsest_level = coarsest;
-  p.v_sensor_m3 = see_m3;
-  p.v_map_m3 = profile.map_volume_m3 > 0.0 ? profile.map_volume_m3 : 0.0;
-  p.v0_max_m3 = std::min(kAwareV0_m3, share * see_m3);
-  p.v1_max_m3 = kAwareV1_m3;
-  p.v2_max_m3 = plan_m3;
-  d.solution = solve(p);
+  d.problem = problem_of(task, precision, time_s, plan_m3);
+  d.solution = solve(d.problem);
   fill_prediction(d);
   last_level_ = d.solution.p0_level;
 
-  // Infeasible: the quickest decision there is; until it is there the vehicle lives on its braking tail.
+  // 5. Infeasible: the quickest decision there is; until it is there the vehicle lives on its braking tail.
   if (d.solution.status != Status::kOk) {
     d.solution.v0_m3 = see_m3;
     d.solution.v1_m3 = d.solution.v0_m3;
     d.solution.v2_m3 = plan_m3;
     fill_prediction(d);
-    double total_s = 0.0;
-    for (const double stage_s : d.predicted_s) total_s += stage_s;
-    deadline_s = std::max(deadline_s, total_s * (1.0 + policy.reserve_ratio) + seconds(config_.minor_frame));
+    time_s =
+        std::max(time_s, sum(d.predicted_s) * (1.0 + policy.reserve_ratio) + seconds(config_.minor_frame));
   }
-
-  // 4. How fast may the next trajectory be? As fast as it can still stop inside known free space, which the
-  // smoother sees to.
-  double speed_mps = v_max_mps_;
-  if (near_goal) speed_mps = std::min(speed_mps, policy.near_goal_speed_mps);
-  if (situation.motion) speed_mps = std::min(speed_mps, policy.motion_speed_mps);
-
-  d.point = {d.solution.p0_level, d.solution.p1_level,      d.solution.v0_m3, d.solution.v1_m3,
-             d.solution.v2_m3,    whole_frames(deadline_s), speed_mps};
+  d.point = {d.solution.p0_level, d.solution.p1_level,  d.solution.v0_m3,          d.solution.v1_m3,
+             d.solution.v2_m3,    whole_frames(time_s), speed_limit_mps(situation)};
   return d;
 }
 

@@ -56,9 +56,9 @@ struct GovernorConfig {
   Design design{Design::kAware};
   Policy policy{};
   StoppingModel stopping{kSitlQuadrotorStopping};
-  std::array<LatencyModel, 3> model{};  ///< Map, export, planner.
-  double point_cloud_s{};               ///< Fixed costs of the other stages.
-  double governor_s{};                  ///< 0 for the static designs: they have none.
+  KnobArray<LatencyModel> model{};
+  double point_cloud_s{};  ///< Fixed costs of the other stages. >= 0.
+  double governor_s{};     ///< 0 for the static designs: they have none.
   double smoother_s{};
   double v_max_mps{6.0};  ///< RoboRun Table "Knob values"; the static design's is 0.5.
   double vehicle_width_m{1.2};
@@ -84,7 +84,7 @@ struct Decision {
   BudgetSource source{};
   SolverProblem problem{};
   SolverSolution solution{};
-  std::array<double, core::kStageCount> predicted_s{};
+  core::StageArray<double> predicted_s{};
   double demand_m{};  ///< Coarsest cell that the space allows: min((g_avg - width) / 4, d_obs / 2).
   bool open{};        ///< Nothing stands ahead: the straight way, as far as it is free, is the plan.
 };
@@ -103,19 +103,33 @@ class Governor {
   [[nodiscard]] double v_max_mps() const noexcept { return v_max_mps_; }
 
  private:
+  struct Task;
+  struct Precision;
+
   [[nodiscard]] Decision decide_static(const SpaceProfile& profile) const noexcept;
-  /// 0 map, 1 export, 2 planner.
-  [[nodiscard]] double predicted_s(std::size_t stage, int level, double volume_m3) const noexcept;
-  /// Of the stages that no knob governs.
+
+  // The steps of decide().
+  [[nodiscard]] int asked_level(const Task& task, Decision& decision) const noexcept;
+  [[nodiscard]] double deadline_s(const Task& task, int asked_level, Decision& decision) const noexcept;
+  [[nodiscard]] Precision in_time(const Task& task, int asked_level, double deadline_s) const noexcept;
+  [[nodiscard]] SolverProblem problem_of(const Task& task, const Precision& precision, double deadline_s,
+                                         double plan_m3) const noexcept;
+  [[nodiscard]] double speed_limit_mps(const Situation& situation) const noexcept;
+
+  /// Levels finer than asked for after so many failed decisions.
+  [[nodiscard]] int finer_levels(const Situation& situation) const noexcept;
+  [[nodiscard]] bool near_goal(const Situation& situation) const noexcept;
+  /// Returns how long a decision takes that processes this share of all that is in view.
+  [[nodiscard]] double needed_s(const Task& task, int level, double share) const noexcept;
+  [[nodiscard]] double predicted_s(Knob knob, int level, double volume_m3) const noexcept;
+  /// Returns the time of the stages that no knob governs.
   [[nodiscard]] double overhead_s() const noexcept;
-  [[nodiscard]] double scale(core::StageId id) const noexcept {
-    return scale_[static_cast<std::size_t>(id)].value();
-  }
+  [[nodiscard]] double scale(core::StageId id) const noexcept { return scale_[id].value(); }
   void fill_prediction(Decision& decision) const noexcept;
   [[nodiscard]] Nanos whole_frames(double time_s) const noexcept;
 
   GovernorConfig config_;
-  std::array<DriftScale, core::kStageCount> scale_{};
+  core::StageArray<DriftScale> scale_{};
   double v_max_mps_{};
   int last_level_{kPrecisionLevels - 1};
 };

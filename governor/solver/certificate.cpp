@@ -40,8 +40,10 @@ struct Terms {
 Terms terms(const SolverProblem& p, int p0, int p1) noexcept {
   const auto i = static_cast<std::size_t>(p0);
   const auto k = static_cast<std::size_t>(p1);
-  return {p.model[0].fixed_s[i] + p.model[1].fixed_s[k] + p.model[2].fixed_s[k], p.model[0].slope_s_per_m3[i],
-          p.model[1].slope_s_per_m3[k], p.model[2].slope_s_per_m3[k]};
+  return {p.model[Knob::kPerceive].fixed_s[i] + p.model[Knob::kExport].fixed_s[k] +
+              p.model[Knob::kPlan].fixed_s[k],
+          p.model[Knob::kPerceive].slope_s_per_m3[i], p.model[Knob::kExport].slope_s_per_m3[k],
+          p.model[Knob::kPlan].slope_s_per_m3[k]};
 }
 
 /// Smallest distance to the deadline that any allowed pair can reach; negative if none is in time.
@@ -62,6 +64,83 @@ double least_gap_s(const SolverProblem& p, double time_s) noexcept {
     }
   }
   return least_s;
+}
+
+/// The chosen pair and volumes, put into the problem.
+struct Claim {
+  const SolverProblem& problem;
+  const SolverSolution& solution;
+  Terms terms;
+  double time_s;
+  double latency_s;
+  double gap_s;                   ///< time - latency.
+  ConstraintArray<double> slack;  ///< g(v) of each constraint g(v) >= 0.
+  ConstraintArray<double> scale;  ///< What a tolerance of a slack is relative to.
+
+  [[nodiscard]] bool tight(std::size_t i) const noexcept { return slack[i] <= kTolerance * scale[i]; }
+};
+
+Claim claim_of(const SolverProblem& p, const SolverSolution& s, double time_s) noexcept {
+  const Terms t = terms(p, s.p0_level, s.p1_level);
+  const double latency_s = t.fixed_s + t.slope0 * s.v0_m3 + t.slope1 * s.v1_m3 + t.slope2 * s.v2_m3;
+  const double gap_s = time_s - latency_s;
+  const double volume_m3 = 1.0 + std::max({s.v0_m3, s.v1_m3, s.v2_m3});
+  Claim claim{p, s, t, time_s, latency_s, gap_s, {}, {}};
+  claim.slack[Constraint::kDeadline] = gap_s;
+  claim.slack[Constraint::kPerceiveSome] = s.v0_m3;
+  claim.slack[Constraint::kChain] = s.v1_m3 - s.v0_m3;
+  claim.slack[Constraint::kSensor] = std::min(p.v_sensor_m3, kInfinite) - s.v1_m3;
+  claim.slack[Constraint::kMap] = std::min(p.v_map_m3, kInfinite) - s.v1_m3;
+  claim.slack[Constraint::kPlanSome] = s.v2_m3;
+  claim.slack[Constraint::kV0Max] = std::min(p.v0_max_m3, kInfinite) - s.v0_m3;
+  claim.slack[Constraint::kV1Max] = std::min(p.v1_max_m3, kInfinite) - s.v1_m3;
+  claim.slack[Constraint::kV2Max] = std::min(p.v2_max_m3, kInfinite) - s.v2_m3;
+  claim.scale.fill(volume_m3);
+  claim.scale[Constraint::kDeadline] = 1.0 + std::fabs(time_s);
+  return claim;
+}
+
+/// Step 1, primal feasibility: every slack is >= 0, and latency and objective are what the knobs give.
+Verdict check_primal(const Claim& c) noexcept {
+  for (std::size_t i = 1; i < kConstraintCount; ++i) {
+    if (!(c.slack[i] >= -kTolerance * c.scale[i])) return Verdict::kVolume;
+  }
+  if (!(c.gap_s >= -kTolerance * c.scale[Constraint::kDeadline])) return Verdict::kLate;
+  if (!near(c.latency_s, c.solution.latency_s) || !near(c.gap_s * c.gap_s, c.solution.objective_s2))
+    return Verdict::kArithmetic;
+  return Verdict::kAccepted;
+}
+
+/// Step 2, dual feasibility and complementary slackness: m_i >= 0, and m_i g_i = 0.
+Verdict check_multipliers(const Claim& c) noexcept {
+  for (std::size_t i = 0; i < kConstraintCount; ++i) {
+    const double multiplier = c.solution.multiplier[i];
+    if (!(multiplier >= 0.0) || !std::isfinite(multiplier)) return Verdict::kSign;
+    if (multiplier > 0.0 && !c.tight(i)) return Verdict::kComplementary;
+    if (((c.solution.active >> i) & 1U) != 0 && !c.tight(i)) return Verdict::kComplementary;
+  }
+  return Verdict::kAccepted;
+}
+
+/// Step 3, stationarity of the Lagrangian L(v) = gap^2 - sum m_i g_i in each volume:
+///   dL/dv_k = -2 gap slope_k + m_deadline slope_k - sum m_i dg_i/dv_k = 0
+/// With pull = 2 gap - m_deadline the first two terms are -pull slope_k.
+Verdict check_stationary(const Claim& c) noexcept {
+  const ConstraintArray<double>& m = c.solution.multiplier;
+  const Terms& t = c.terms;
+  const double pull = 2.0 * std::max(c.gap_s, 0.0) - m[Constraint::kDeadline];
+  const std::array<double, 3> gradient{
+      -pull * t.slope0 - m[Constraint::kPerceiveSome] + m[Constraint::kChain] + m[Constraint::kV0Max],
+      -pull * t.slope1 - m[Constraint::kChain] + m[Constraint::kSensor] + m[Constraint::kMap] +
+          m[Constraint::kV1Max],
+      -pull * t.slope2 - m[Constraint::kPlanSome] + m[Constraint::kV2Max]};
+  const std::array<double, 3> slope{t.slope0, t.slope0 + t.slope1, t.slope2};
+  for (std::size_t i = 0; i < 3; ++i) {
+    // A gap within the tolerance of the deadline is no gap.
+    if (!(std::fabs(gradient[i]) <= kTolerance * (1.0 + 2.0 * std::fabs(c.time_s)) * (slope[i] + 1e-12)))
+      return Verdict::kStationary;
+  }
+  return Verdict::kAccepted;
 }
 
 }  // namespace
@@ -102,47 +181,15 @@ Verdict verify(const SolverProblem& p, const SolverSolution& s) noexcept {
   if (s.status == Status::kInfeasible) return least_s < 0.0 ? Verdict::kAccepted : Verdict::kNotInfeasible;
 
   if (!allowed(p, s.p0_level, s.p1_level)) return Verdict::kPrecision;
-  const Terms t = terms(p, s.p0_level, s.p1_level);
-  const double latency_s = t.fixed_s + t.slope0 * s.v0_m3 + t.slope1 * s.v1_m3 + t.slope2 * s.v2_m3;
-  const double gap_s = time_s - latency_s;
-  // g(v) >= 0 of each constraint, and its scale.
-  const std::array<double, kConstraintCount> slack{gap_s,
-                                                   s.v0_m3,
-                                                   s.v1_m3 - s.v0_m3,
-                                                   std::min(p.v_sensor_m3, kInfinite) - s.v1_m3,
-                                                   std::min(p.v_map_m3, kInfinite) - s.v1_m3,
-                                                   s.v2_m3,
-                                                   std::min(p.v0_max_m3, kInfinite) - s.v0_m3,
-                                                   std::min(p.v1_max_m3, kInfinite) - s.v1_m3,
-                                                   std::min(p.v2_max_m3, kInfinite) - s.v2_m3};
-  const double volume_m3 = 1.0 + std::max({s.v0_m3, s.v1_m3, s.v2_m3});
-  for (std::size_t i = 1; i < kConstraintCount; ++i) {
-    if (!(slack[i] >= -kTolerance * volume_m3)) return Verdict::kVolume;
+  const Claim claim = claim_of(p, s, time_s);
+  for (const auto check : {check_primal, check_multipliers, check_stationary}) {
+    const Verdict verdict = check(claim);
+    if (verdict != Verdict::kAccepted) return verdict;
   }
-  if (!(gap_s >= -kTolerance * (1.0 + std::fabs(time_s)))) return Verdict::kLate;
-  if (!near(latency_s, s.latency_s) || !near(gap_s * gap_s, s.objective_s2)) return Verdict::kArithmetic;
-  for (std::size_t i = 0; i < kConstraintCount; ++i) {
-    const double scale = i == 0 ? 1.0 + std::fabs(time_s) : volume_m3;
-    const bool tight = slack[i] <= kTolerance * scale;
-    if (!(s.multiplier[i] >= 0.0) || !(s.multiplier[i] < 1e300)) return Verdict::kSign;
-    if (s.multiplier[i] > 0.0 && !tight) return Verdict::kComplementary;
-    if (((s.active >> i) & 1U) != 0 && !tight) return Verdict::kComplementary;
-  }
-  const auto m = [&s](Constraint c) { return s.multiplier[static_cast<std::size_t>(c)]; };
-  const double pull = 2.0 * std::max(gap_s, 0.0) - m(Constraint::kDeadline);
-  const std::array<double, 3> gradient{
-      -pull * t.slope0 - m(Constraint::kPerceiveSome) + m(Constraint::kChain) + m(Constraint::kV0Max),
-      -pull * t.slope1 - m(Constraint::kChain) + m(Constraint::kSensor) + m(Constraint::kMap) +
-          m(Constraint::kV1Max),
-      -pull * t.slope2 - m(Constraint::kPlanSome) + m(Constraint::kV2Max)};
-  const std::array<double, 3> slope{t.slope0, t.slope0 + t.slope1, t.slope2};
-  for (std::size_t i = 0; i < 3; ++i) {
-    // A gap within the tolerance of the deadline is no gap.
-    if (!(std::fabs(gradient[i]) <= kTolerance * (1.0 + 2.0 * std::fabs(time_s)) * (slope[i] + 1e-12)))
-      return Verdict::kStationary;
-  }
-  return gap_s - least_s <= kTolerance * (gap_s + 1e-6 * (1.0 + std::fabs(time_s))) ? Verdict::kAccepted
-                                                                                    : Verdict::kBetterPair;
+  // Step 4: no other pair comes closer to the deadline.
+  return claim.gap_s - least_s <= kTolerance * (claim.gap_s + 1e-6 * (1.0 + std::fabs(time_s)))
+             ? Verdict::kAccepted
+             : Verdict::kBetterPair;
 }
 
 }  // namespace roborun::governor

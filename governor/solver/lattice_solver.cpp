@@ -76,10 +76,11 @@ bool solve_pair(const SolverProblem& p, const Bounds& b, double delta_d_s, int p
                 Candidate& out) noexcept {
   const auto i0 = static_cast<std::size_t>(p0);
   const auto i1 = static_cast<std::size_t>(p1);
-  const double a = p.model[0].slope_s_per_m3[i0];
-  const double e = p.model[1].slope_s_per_m3[i1];
-  const double c = p.model[2].slope_s_per_m3[i1];
-  const double fixed_s = p.model[0].fixed_s[i0] + p.model[1].fixed_s[i1] + p.model[2].fixed_s[i1];
+  const double a = p.model[Knob::kPerceive].slope_s_per_m3[i0];
+  const double e = p.model[Knob::kExport].slope_s_per_m3[i1];
+  const double c = p.model[Knob::kPlan].slope_s_per_m3[i1];
+  const double fixed_s = p.model[Knob::kPerceive].fixed_s[i0] + p.model[Knob::kExport].fixed_s[i1] +
+                         p.model[Knob::kPlan].fixed_s[i1];
   const double most_s = fixed_s + a * b.v0_m3 + e * b.v1_m3 + c * b.v2_m3;
   if (!(fixed_s <= delta_d_s) || !std::isfinite(a + e + c)) return false;
   out = {p0, p1, b.v0_m3, b.v1_m3, b.v2_m3, most_s, delta_d_s - most_s};
@@ -107,7 +108,6 @@ bool better(const Candidate& a, const Candidate& b) noexcept {
 }
 
 void certify(const SolverProblem& p, const Bounds& b, bool deadline, SolverSolution& s) noexcept {
-  const auto multiplier = [&s](Constraint c) -> double& { return s.multiplier[static_cast<std::size_t>(c)]; };
   set(s, deadline, bit(Constraint::kDeadline));
   set(s, s.v0_m3 <= 0.0, bit(Constraint::kPerceiveSome));
   set(s, s.v1_m3 <= s.v0_m3, bit(Constraint::kChain));
@@ -125,18 +125,18 @@ void certify(const SolverProblem& p, const Bounds& b, bool deadline, SolverSolut
   const auto i0 = static_cast<std::size_t>(s.p0_level);
   const auto i1 = static_cast<std::size_t>(s.p1_level);
   const double twice_gap_s = 2.0 * (std::min(p.delta_d_s, kHuge) - s.latency_s);
-  const double perceive = twice_gap_s * p.model[0].slope_s_per_m3[i0];
-  double hand_on = twice_gap_s * p.model[1].slope_s_per_m3[i1];
+  const double perceive = twice_gap_s * p.model[Knob::kPerceive].slope_s_per_m3[i0];
+  double hand_on = twice_gap_s * p.model[Knob::kExport].slope_s_per_m3[i1];
   if ((s.active & bit(Constraint::kV0Max)) != 0) {
-    multiplier(Constraint::kV0Max) = perceive;
+    s.multiplier[Constraint::kV0Max] = perceive;
   } else {
-    multiplier(Constraint::kChain) = perceive;
+    s.multiplier[Constraint::kChain] = perceive;
     hand_on += perceive;
   }
   const bool sensor = (s.active & bit(Constraint::kSensor)) != 0;
   const bool map = (s.active & bit(Constraint::kMap)) != 0;
-  multiplier(sensor ? Constraint::kSensor : (map ? Constraint::kMap : Constraint::kV1Max)) = hand_on;
-  multiplier(Constraint::kV2Max) = twice_gap_s * p.model[2].slope_s_per_m3[i1];
+  s.multiplier[sensor ? Constraint::kSensor : (map ? Constraint::kMap : Constraint::kV1Max)] = hand_on;
+  s.multiplier[Constraint::kV2Max] = twice_gap_s * p.model[Knob::kPlan].slope_s_per_m3[i1];
 }
 
 }  // namespace
@@ -218,8 +218,9 @@ SolverSolution solve(const SolverProblem& problem) noexcept {
   }
   s.p0_level = std::clamp(b.p0_coarsest, 0, b.p1_coarsest);
   s.p1_level = b.p1_coarsest;
-  s.latency_s = problem.model[0].latency_s(s.p0_level, 0.0) + problem.model[1].latency_s(s.p1_level, 0.0) +
-                problem.model[2].latency_s(s.p1_level, 0.0);
+  s.latency_s = problem.model[Knob::kPerceive].latency_s(s.p0_level, 0.0) +
+                problem.model[Knob::kExport].latency_s(s.p1_level, 0.0) +
+                problem.model[Knob::kPlan].latency_s(s.p1_level, 0.0);
   s.objective_s2 = (delta_d_s - s.latency_s) * (delta_d_s - s.latency_s);
   return s;
 }

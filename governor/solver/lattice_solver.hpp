@@ -7,14 +7,15 @@
 #include <cstdint>
 
 #include "firmware_if/status.hpp"
+#include "governor/models/knob.hpp"
 #include "governor/models/latency_model.hpp"
 
 namespace roborun::governor {
 
-/// Stages of Eq. 3: 0 perception (map), 1 perception to planning (export), 2 planning.
+/// The instance of Eq. 3 that one decision solves.
 struct SolverProblem {
   double delta_d_s{};  ///< Time for the three stages together.
-  std::array<LatencyModel, 3> model{};
+  KnobArray<LatencyModel> model{};
   double p_min_m{kFinestCell_m};  ///< Finest cell of the lattice p_min * 2^k. > 0.
   int levels{kPrecisionLevels};   ///< Of the lattice, 1 .. kPrecisionLevels.
   double g_min_m{};               ///< Lower bound of p0.
@@ -41,6 +42,9 @@ enum class Constraint : std::uint8_t {
   kV2Max,
 };
 inline constexpr std::size_t kConstraintCount = 9;
+/// One value per constraint.
+template <typename T>
+using ConstraintArray = core::EnumArray<Constraint, T, kConstraintCount>;
 [[nodiscard]] const char* to_string(Constraint constraint) noexcept;
 
 /// Why p0 is what it is, or why there is no answer; bits above those of the constraints.
@@ -72,22 +76,26 @@ struct SolverSolution {
   std::uint16_t active{};  ///< 1 << Constraint of those that hold with equality, and Reason bits.
   /// Of min (delta_d - latency)^2 at the chosen pair of precisions: d objective / d bound, >= 0. s2/s for the
   /// deadline, s2/m3 for the others.
-  std::array<double, kConstraintCount> multiplier{};
+  ConstraintArray<double> multiplier{};
 };
 
-/// The exact optimum of
-///   minimise (delta_d - sum latency_i(p_i, v_i))^2
-///   subject to  sum latency_i <= delta_d;  g_min <= p0 <= min(p1, g_avg, d_obs);  p1 = p2;  p on the
-///   lattice;
-///               0 <= v0 <= v1 <= min(v_sensor, v_map);  v2 <= v2_max;  and the upper ends of the knobs.
+/// Returns the exact optimum of
+///   minimise    (delta_d - sum latency_i(p_i, v_i))^2
+///   subject to  sum latency_i <= delta_d
+///               g_min <= p0 <= min(p1, g_avg, d_obs);  p1 = p2;  p0, p1 on the lattice
+///               0 <= v0 <= v1 <= min(v_sensor, v_map);  0 <= v2 <= v2_max
+///               v0 <= v0_max;  v1 <= v1_max
+///
 /// For a pair (p0, p1) latency is linear in the volumes with slopes >= 0, so its optimum is at a vertex: all
 /// volumes at their bounds if that fits into the time, otherwise the deadline is active and v0, v2, v1 are
-/// filled in this order. Total order among pairs whose distance to the deadline is the same to ten digits:
-/// more perceived volume v0, then more planning volume v2, then finer p0, finer p1, more v1. (What precision
-/// the space asks for is in the bounds of p0; beyond that, volume comes first.) No answer: the coarsest
-/// allowed pair with zero volumes, the quickest decision there is. An infinite time or bound counts as 1e12;
-/// a pair whose coefficients are not finite or whose latency is NaN is left out. RT-safe: 21 pairs of at most
-/// three steps each, no iteration, no allocation.
+/// filled in this order.
+/// Total order among pairs whose distance to the deadline is the same to ten digits: more perceived volume
+/// v0, then more planning volume v2, then finer p0, finer p1, more v1. (What precision the space asks for is
+/// in the bounds of p0; beyond that, volume comes first.)
+/// No answer: the coarsest allowed pair with zero volumes, the quickest decision there is.
+/// An infinite time or bound counts as 1e12; a pair whose coefficients are not finite or whose latency is NaN
+/// is left out.
+/// RT-safe: 21 pairs of at most three steps each, no iteration, no allocation.
 [[nodiscard]] SolverSolution solve(const SolverProblem& problem) noexcept;
 
 }  // namespace roborun::governor

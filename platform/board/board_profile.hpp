@@ -15,7 +15,7 @@ namespace roborun::board {
 /// What a simulated mission charges, and what its governor expects.
 struct Profile {
   core::CostProfile costs{};
-  std::array<governor::LatencyModel, 3> model{};  ///< Map, export, planner: the 99th percentile.
+  governor::KnobArray<governor::LatencyModel> model{};  ///< Map, export, planner: the 99th percentile.
 };
 
 /// One stage of a board: its models, and how far they are from points that they were not fitted on.

@@ -15,15 +15,9 @@ constexpr double kTrajectoryStep_s = 0.5;  // of the points that order the space
 constexpr std::size_t kTrajectoryPoints = 32;
 constexpr double kCornerRoom_m = 0.25;
 constexpr double kAtRest_mps = 0.05;
-constexpr double kMotionReach_m = 15.0;  // farther away depth noise looks like motion
-constexpr int kMotionPoints = 3;
-constexpr double kStanding_mps = 0.5;
 constexpr double kTooFast = 1.5;
 constexpr double kStraightShare = 2.0 / 3.0;  // of the horizon
 constexpr double kCollinear = 1.0 - 1e-6;     // cosine
-constexpr Nanos kMotionMemory{3'000'000'000};
-constexpr Nanos kTraceMemory{10'000'000'000};  // as long as the map may remember what has gone
-constexpr double kTraceSpacing_m = 0.6;
 /// What the way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
 constexpr double kBeyond_mps = 2.0;
 
@@ -67,30 +61,6 @@ core::MeteredBudget DecisionPipeline::table_budget_of(core::StageId id) noexcept
   return {meter_, id, meter_.grant(id, core::slot(core::slot_of(id)).budget)};
 }
 
-void DecisionPipeline::sense_motion(const DecisionInput& in, const Aabb& relevant_W,
-                                    core::StageBudget& budget, core::Work& work) noexcept {
-  const stages::PolledView known(map_.view(), budget, work);
-  core::StaticVector<Vector3, kTraces / 4> appeared_W;
-  int appeared = 0;
-  for (const stages::CloudPoint& point : cloud_.points()) {
-    const Vector3 offset = point.p_W - in.p_WB;
-    const bool behind = offset.dot(in.v_WB) < 0.0 && in.v_WB.norm() > kStanding_mps;
-    if (offset.norm() > kMotionReach_m || behind || !relevant_W.contains(point.p_W)) continue;
-    if (!known.is_free_at_finest(Aabb::around(point.p_W, 0.5 * kFinestCell_m), work.units)) continue;
-    ++appeared;
-    const bool noted = std::any_of(appeared_W.begin(), appeared_W.end(), [&point](const Vector3& other_W) {
-      return (other_W - point.p_W).squaredNorm() < kTraceSpacing_m * kTraceSpacing_m;
-    });
-    if (!noted && !appeared_W.push_back(point.p_W)) break;
-  }
-  if (appeared < kMotionPoints) return;
-  motion_until_ = in.now + kMotionMemory;
-  for (const Vector3& p_W : appeared_W) {
-    trace_[next_trace_] = {p_W, in.now + kTraceMemory};
-    next_trace_ = (next_trace_ + 1) % kTraces;
-  }
-}
-
 void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) noexcept {
   core::MeteredBudget budget = table_budget_of(core::StageId::kPointCloud);
   core::Work work;
@@ -100,8 +70,8 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   const double r_m = radius_m();
   const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m),
                         config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
-  sense_motion(in, relevant_W, budget, work);
-  out.motion = in.now < motion_until_;
+  motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W}, cloud_.points(), map_.view(), budget, work);
+  out.motion = motion_.moving(in.now);
   (void)profile_space({}, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W,
                       relevant_W, r_m, out.profile, budget, work);
   if (!sees_all) out.profile.obstacle_ahead_m = 0.0;
@@ -136,10 +106,7 @@ void DecisionPipeline::integrate(const DecisionInput& in, DecisionOutput& out) n
   const OperatingPoint& point = out.decision.point;
   core::MeteredBudget budget = budget_of(core::StageId::kMap, out);
   stages::IntegrationResult integrated;
-  core::StaticVector<Vector3, kTraces> moved_W;
-  for (const Trace& trace : trace_) {
-    if (in.now < trace.until) (void)moved_W.push_back(trace.p_W);
-  }
+  const MotionWatch::Places moved_W = motion_.places_W(in.now);
   (void)map_.integrate({in.frames,
                         point.p0_level,
                         point.v0_m3,
@@ -161,26 +128,25 @@ void DecisionPipeline::check_committed(const DecisionInput& in, DecisionOutput& 
   const double until_s = free_until_s(polled, *in.committed, from_s, config_.vehicle_radius_m, work.units);
   // Where something moves, what is fast now is not flown on until a slower plan is there.
   const bool too_fast = out.motion && in.v_WB.norm() > kTooFast * out.decision.point.speed_limit_mps;
-  if (until_s > 1e300 && !too_fast) return;
+  if (std::isinf(until_s) && !too_fast) return;
   const MonotonicTime free_until =
-      until_s > 1e300 ? MonotonicTime::max() : in.committed->start_time + from_seconds(until_s);
-  offer_stop(in, free_until, known, work, out);
+      std::isinf(until_s) ? MonotonicTime::max() : in.committed->start_time + from_seconds(until_s);
+  out.early_stop = stop_before(in, free_until, known, work, out.latency);
 }
 
-void DecisionPipeline::offer_stop(const DecisionInput& in, MonotonicTime free_until,
-                                  const stages::MapView& known, core::Work& work,
-                                  DecisionOutput& out) noexcept {
-  const MonotonicTime soonest = in.now + out.latency + config_.minor_frame;
+std::optional<Trajectory> DecisionPipeline::stop_before(const DecisionInput& in, MonotonicTime free_until,
+                                                        const stages::MapView& known, core::Work& work,
+                                                        Nanos latency) const noexcept {
+  const MonotonicTime soonest = in.now + latency + config_.minor_frame;
   const TrajectoryPoint then = in.committed->at(soonest);
   Trajectory stop;
   if (then.v_W.norm() <= kAtRest_mps ||
       smoother_.brake(then, soonest, {config_.acceleration_mps2, config_.acceleration_mps2}, stop) !=
           Status::kOk)
-    return;
+    return std::nullopt;
   const double stop_free_s = free_until_s(known, stop, 0.0, config_.vehicle_radius_m, work.units);
-  if (stop_free_s < 1e300 && soonest + from_seconds(stop_free_s) < free_until) return;
-  out.kind = DecisionKind::kBrake;
-  out.trajectory = stop;
+  if (!std::isinf(stop_free_s) && soonest + from_seconds(stop_free_s) < free_until) return std::nullopt;
+  return stop;
 }
 
 void DecisionPipeline::export_map(const DecisionInput& in, DecisionOutput& out) noexcept {
@@ -191,75 +157,106 @@ void DecisionPipeline::export_map(const DecisionInput& in, DecisionOutput& out) 
   charge(core::StageId::kExport, exported, out);
 }
 
-void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexcept {
+void DecisionPipeline::search(const DecisionInput& in, double room_m, DecisionOutput& out) noexcept {
   const stages::FencedView fenced(map_.view(), config_.fence);
   const stages::MapView& view = config_.fence.empty() ? map_.view() : fenced;
-  const OperatingPoint& point = out.decision.point;
-  const MonotonicTime takes_over = in.now + point.deadline;
-  if (in.climbing && takes_over < in.committed->start_time + from_seconds(in.committed->duration_s())) return;
-  const TrajectoryPoint start = in.committed->at(takes_over);
-  const double r_m = radius_m();
+  stages::PlanRequest request;
+  request.start_W = draft_.start.p_W;
+  request.goal_W = in.goal_W;
+  request.bounds_W = config_.flight_bounds_W;
+  request.radius_m = radius_m() + room_m;
+  request.volume_m3 = std::max(out.decision.point.v2_m3 - draft_.planner_work.volume_m3, 0.0);
+  request.horizon_m = config_.horizon_m;
+  request.kept_W = kept_W_;
+  request.seed = in.seed;
+  meter_.charge_to(core::StageId::kPlanner);
+  stages::PlanResult planned;
+  out.planner_status = planner_.plan(request, view, *draft_.planner_budget, planned);
+  draft_.planner_work.units += planned.work.units;
+  draft_.planner_work.volume_m3 += planned.work.volume_m3;
+  kept_W_ = planned.path_W;
+}
 
-  const stages::FinestView known(view);
-  core::Work planner_work = out.work[index(core::StageId::kPlanner)];
-  const double from_s = seconds(in.now - in.committed->start_time);
-  const double committed_until_s =
-      free_until_s(known, *in.committed, from_s, config_.vehicle_radius_m, planner_work.units);
-
-  // First with room for the smoother to cut corners, then as tight as the vehicle can fly.
+void DecisionPipeline::fit(core::StageBudget& budget, DecisionOutput& out) noexcept {
+  if (kept_W_.size() < 2) return;
+  const stages::FencedView fenced(map_.view(), config_.fence);
+  const stages::MapView& view = config_.fence.empty() ? map_.view() : fenced;
+  stages::SmoothRequest request;
+  request.path_W = {kept_W_.begin(), kept_W_.size()};
+  request.start = draft_.start;
+  request.start_time = draft_.takes_over;
+  request.limits = {out.decision.point.speed_limit_mps, config_.acceleration_mps2};
+  request.radius_m = out.planner_status == Status::kStartBlocked ? config_.vehicle_radius_m : radius_m();
+  meter_.charge_to(core::StageId::kSmoother);
   stages::SmoothResult smoothed;
-  core::Work smoother_work;
-  planner_work.level = point.p1_level;
-  core::MeteredBudget planner_budget = budget_of(core::StageId::kPlanner, out);
-  core::MeteredBudget smoother_budget = table_budget_of(core::StageId::kSmoother);
-  for (const double room_m : {kCornerRoom_m, 0.0}) {
-    stages::PlanRequest request;
-    request.start_W = start.p_W;
-    request.goal_W = in.goal_W;
-    request.bounds_W = config_.flight_bounds_W;
-    request.radius_m = r_m + room_m;
-    request.volume_m3 = std::max(point.v2_m3 - planner_work.volume_m3, 0.0);
-    request.horizon_m = config_.horizon_m;
-    request.kept_W = kept_W_;
-    request.seed = in.seed;
-    stages::PlanResult planned;
-    meter_.charge_to(core::StageId::kPlanner);
-    out.planner_status = planner_.plan(request, view, planner_budget, planned);
-    out.planned_to_goal = planned.reaches_goal;
-    planner_work.units += planned.work.units;
-    planner_work.volume_m3 += planned.work.volume_m3;
-    kept_W_ = planned.path_W;
-    // Too tight for extra room is no reason to flee.
-    if (room_m > 0.0 && out.planner_status == Status::kStartBlocked) continue;
-    if (planned.path_W.size() >= 2) {
-      stages::SmoothRequest smooth;
-      smooth.path_W = {planned.path_W.begin(), planned.path_W.size()};
-      smooth.start = start;
-      smooth.start_time = takes_over;
-      smooth.limits = {point.speed_limit_mps, config_.acceleration_mps2};
-      smooth.radius_m = out.planner_status == Status::kStartBlocked ? config_.vehicle_radius_m : r_m;
-      meter_.charge_to(core::StageId::kSmoother);
-      out.smoother_status = smoother_.smooth(smooth, view, smoother_budget, smoothed);
-      smoother_work.units += smoothed.work.units;
-    }
-    if (out.smoother_status == Status::kOk) break;
-  }
-  charge(core::StageId::kPlanner, planner_work, out);
-  charge(core::StageId::kSmoother, smoother_work, out);
+  out.smoother_status = smoother_.smooth(request, view, budget, smoothed);
+  draft_.smoother_work.units += smoothed.work.units;
+  if (out.smoother_status == Status::kOk) draft_.trajectory = smoothed.trajectory;
+}
 
+void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexcept {
+  draft_.begun = false;
+  draft_.takes_over = in.now + out.decision.point.deadline;
+  const MonotonicTime ends = in.committed->start_time + from_seconds(in.committed->duration_s());
+  if (in.climbing && draft_.takes_over < ends) return;
+  draft_.begun = true;
+  draft_.start = in.committed->at(draft_.takes_over);
+  draft_.planner_work = out.work[index(core::StageId::kPlanner)];
+  draft_.smoother_work = {};
+  const stages::FencedView fenced(map_.view(), config_.fence);
+  const stages::FinestView known(config_.fence.empty() ? map_.view() : fenced);
+  draft_.committed_until_s = free_until_s(known, *in.committed, seconds(in.now - in.committed->start_time),
+                                          config_.vehicle_radius_m, draft_.planner_work.units);
+  draft_.planner_work.level = out.decision.point.p1_level;
+  draft_.planner_budget.emplace(budget_of(core::StageId::kPlanner, out));
+  search(in, kCornerRoom_m, out);
+}
+
+void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noexcept {
+  if (draft_.begun) {
+    core::MeteredBudget budget = table_budget_of(core::StageId::kSmoother);
+    // First with room for the smoother to cut corners, then as tight as the vehicle can fly: too tight for
+    // extra room is no reason to flee.
+    if (out.planner_status != Status::kStartBlocked) fit(budget, out);
+    if (out.smoother_status != Status::kOk) {
+      search(in, 0.0, out);
+      fit(budget, out);
+    }
+    charge(core::StageId::kPlanner, draft_.planner_work, out);
+    charge(core::StageId::kSmoother, draft_.smoother_work, out);
+    choose(in, out);
+  }
+  for (std::size_t i = 0; i < core::kStageCount; ++i) {
+    const auto stage = static_cast<core::StageId>(i);
+    // The straight way alone is a few cells: too little to tell how fast the processor is.
+    if (stage == core::StageId::kPlanner && out.decision.open) continue;
+    governor_.observe(stage, out.decision.predicted_s[i], seconds(out.cost[i]));
+  }
+  failures_ = out.smoother_status == Status::kOk || in.climbing ? 0 : failures_ + 1;
+}
+
+void DecisionPipeline::choose(const DecisionInput& in, DecisionOutput& out) noexcept {
   // A new trajectory begins slowly and another one may be there next time: what is flown now is kept as long
   // as it is free, has not begun to brake and arrives no later.
+  const bool is_free = std::isinf(draft_.committed_until_s);
+  const bool has_new = out.smoother_status == Status::kOk;
   const MonotonicTime brakes = in.committed->start_time + from_seconds(in.committed->brake_begin_s);
-  const bool keeps = committed_until_s > 1e300 && start.v_W.norm() < 1.1 * point.speed_limit_mps &&
-                     takes_over < brakes &&
-                     arrival_s(*in.committed, in) <= arrival_s(smoothed.trajectory, in);
-  if (out.smoother_status == Status::kOk && !keeps) {
+  const bool keeps = is_free && draft_.start.v_W.norm() < 1.1 * out.decision.point.speed_limit_mps &&
+                     draft_.takes_over < brakes && has_new &&
+                     arrival_s(*in.committed, in) <= arrival_s(draft_.trajectory, in);
+  if (has_new && !keeps) {
     out.kind = DecisionKind::kNew;
-    out.trajectory = smoothed.trajectory;
-  } else if (committed_until_s < 1e300 && !in.climbing) {
-    const MonotonicTime free_until = in.committed->start_time + from_seconds(committed_until_s);
-    offer_stop(in, free_until, known, smoother_work, out);
+    out.trajectory = draft_.trajectory;
+    return;
   }
+  if (is_free || in.climbing) return;
+  const stages::FencedView fenced(map_.view(), config_.fence);
+  const stages::FinestView known(config_.fence.empty() ? map_.view() : fenced);
+  const MonotonicTime free_until = in.committed->start_time + from_seconds(draft_.committed_until_s);
+  const auto stop = stop_before(in, free_until, known, draft_.smoother_work, out.latency);
+  if (!stop) return;
+  out.kind = DecisionKind::kBrake;
+  out.trajectory = *stop;
 }
 
 void DecisionPipeline::run(core::StageId id, const DecisionInput& in, DecisionOutput& out) noexcept {
@@ -275,17 +272,9 @@ void DecisionPipeline::run(core::StageId id, const DecisionInput& in, DecisionOu
     case core::StageId::kExport:
       return export_map(in, out);
     case core::StageId::kPlanner:
-      plan(in, out);
-      for (std::size_t i = 0; i < core::kStageCount; ++i) {
-        const auto stage = static_cast<core::StageId>(i);
-        // The straight way alone is a few cells: too little to tell how fast the processor is.
-        if (stage == core::StageId::kPlanner && out.decision.open) continue;
-        governor_.observe(stage, out.decision.predicted_s[i], seconds(out.cost[i]));
-      }
-      failures_ = out.smoother_status == Status::kOk || in.climbing ? 0 : failures_ + 1;
-      return;
+      return plan(in, out);
     case core::StageId::kSmoother:
-      return;
+      return smooth(in, out);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "core/executive/frame_table.hpp"
@@ -12,6 +13,7 @@
 #include "core/geometry/vector.hpp"
 #include "core/trajectory.hpp"
 #include "governor/policy/governor.hpp"
+#include "platform/flight/motion_watch.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/perception/point_cloud.hpp"
 #include "stages/perception/space_profiler.hpp"
@@ -48,15 +50,17 @@ struct DecisionInput {
 enum class DecisionKind : std::uint8_t {
   kKeep,   ///< Nothing better: fly on, the committed trajectory ends in a stop.
   kNew,    ///< `trajectory` takes over at its start time.
-  kBrake,  ///< The committed trajectory is no longer free: `trajectory` is the stop. Also after the map.
+  kBrake,  ///< The committed trajectory is no longer free: `trajectory` is the stop.
 };
 
 struct DecisionOutput {
   DecisionKind kind{DecisionKind::kKeep};
   Trajectory trajectory{};
+  /// Right after the map: what is flown is blocked in it, and the rest of the decision would be too long to
+  /// wait. Whoever flies this stop gives it as in.committed to the stages that follow.
+  std::optional<Trajectory> early_stop{};
   Status planner_status{Status::kNotReady};
   Status smoother_status{Status::kNotReady};
-  bool planned_to_goal{};  ///< The path ends at the goal of the mission.
   SpaceProfile profile{};
   governor::Decision decision{};
   std::array<core::Work, core::kStageCount> work{};
@@ -74,11 +78,9 @@ class DecisionPipeline {
                    stages::PointCloud& cloud, stages::OccupancyMap& map, stages::Planner& planner,
                    stages::Smoother& smoother) noexcept;
 
-  /// One stage of a decision; all of them in order make one. `out` is begun by the first (kPointCloud). The
-  /// smoother alternates with the planner in the planner's turn, each charged for its own, and has no turn.
-  /// After kMap `out.kind` may be kBrake: what is flown is blocked in the newest map, and the rest of the
-  /// decision would be too long to wait. Whoever flies the stop then gives it as in.committed to the stages
-  /// that follow, and takes kind back to kKeep.
+  /// One stage of a decision; all of them in order make one. `out` is begun by the first (kPointCloud) and
+  /// complete after the last (kSmoother). Where the path leaves the smoother no room, kSmoother plans once
+  /// more, as tight as the vehicle can fly; that time is the planner's.
   /// RT-safe: no allocation; bounded by the stages' budgets.
   void run(core::StageId id, const DecisionInput& in, DecisionOutput& out) noexcept;
   /// Of the map, as the planner sees it but for the fence.
@@ -88,19 +90,19 @@ class DecisionPipeline {
   [[nodiscard]] double radius_m() const noexcept { return config_.vehicle_radius_m + config_.inflation_m; }
 
  private:
-  /// Where something was seen to move, a ring.
-  struct Trace {
-    Vector3 p_W = Vector3::Zero();
-    MonotonicTime until{};
+  /// What the planner's slot leaves to the smoother's.
+  struct Draft {
+    bool begun{};  ///< False: nothing is planned in this decision.
+    MonotonicTime takes_over{};
+    TrajectoryPoint start{};     ///< Where the new trajectory begins.
+    double committed_until_s{};  ///< How long what is flown stays free; +inf: to its end.
+    std::optional<core::MeteredBudget> planner_budget{};
+    core::Work planner_work{}, smoother_work{};
+    Trajectory trajectory{};
   };
-  static constexpr std::size_t kTraces = 64;
 
   void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
   void perceive(const DecisionInput& in, DecisionOutput& out) noexcept;
-  /// Notes surfaces near the vehicle where the map, before it gets these images, knows free space. Not behind
-  /// it: who is followed must not slow down.
-  void sense_motion(const DecisionInput& in, const Aabb& relevant_W, core::StageBudget& budget,
-                    core::Work& work) noexcept;
   /// The plan before: straight towards the goal, for most of what can be seen.
   [[nodiscard]] bool went_straight(const DecisionInput& in) const noexcept;
   void govern(const DecisionInput& in, DecisionOutput& out) noexcept;
@@ -109,10 +111,18 @@ class DecisionPipeline {
   void check_committed(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// The stop that takes over as soon as it can, if it stays free until `free_until` at least: a straight
   /// stop out of a descent meets the ground sooner than what it replaces.
-  void offer_stop(const DecisionInput& in, MonotonicTime free_until, const stages::MapView& known,
-                  core::Work& work, DecisionOutput& out) noexcept;
+  [[nodiscard]] std::optional<Trajectory> stop_before(const DecisionInput& in, MonotonicTime free_until,
+                                                      const stages::MapView& known, core::Work& work,
+                                                      Nanos latency) const noexcept;
   void export_map(const DecisionInput& in, DecisionOutput& out) noexcept;
   void plan(const DecisionInput& in, DecisionOutput& out) noexcept;
+  void smooth(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// One search, with so much room around the vehicle; the path goes to kept_W_.
+  void search(const DecisionInput& in, double room_m, DecisionOutput& out) noexcept;
+  /// The path of the last search as a trajectory.
+  void fit(core::StageBudget& budget, DecisionOutput& out) noexcept;
+  /// Between the new trajectory, what is flown, and a stop.
+  void choose(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// What is left of the deadline for this stage, when the stages after it get what was predicted for them.
   [[nodiscard]] core::MeteredBudget budget_of(core::StageId id, const DecisionOutput& out) noexcept;
   /// For the stages that the governor does not shape: the frame table's.
@@ -126,9 +136,8 @@ class DecisionPipeline {
   stages::Planner& planner_;
   stages::Smoother& smoother_;
   stages::Path kept_W_;  ///< What was planned last.
-  MonotonicTime motion_until_{};
-  std::array<Trace, kTraces> trace_{};
-  std::size_t next_trace_{0};
+  MotionWatch motion_;
+  Draft draft_;
   int failures_{0};  ///< Decisions in a row without a trajectory.
 };
 

@@ -115,24 +115,28 @@ const Trajectory& DecisionProgram::flown(MonotonicTime now) const noexcept {
   return newer ? handed_over_ : reported;
 }
 
-bool DecisionProgram::hand_over(const core::LaneExecutive& lane) noexcept {
-  if (out_.kind == DecisionKind::kKeep) return false;
+bool DecisionProgram::hand_over(const Trajectory& trajectory, bool is_stop,
+                                const core::LaneExecutive& lane) noexcept {
   // Too late for its own start: the vehicle already flies its braking tail, and the result is of no use. A
   // stop is still better a little late; after a stall it would begin where the vehicle is no more.
-  const Nanos latest = out_.kind == DecisionKind::kNew ? Nanos{0} : kLatestStop;
-  if (out_.trajectory.start_time + latest < lane.now()) {
+  const Nanos latest = is_stop ? kLatestStop : Nanos{0};
+  if (trajectory.start_time + latest < lane.now()) {
     ++too_late_;
     return false;
   }
-  handed_over_ = out_.trajectory;
-  mail_.offer.draft() = {out_.trajectory, out_.kind == DecisionKind::kBrake};
+  handed_over_ = trajectory;
+  mail_.offer.draft() = {trajectory, is_stop};
   mail_.offer.publish();
   return true;
 }
 
 void DecisionProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
   if (slot == SlotId::kGather) return gather(lane);
-  if (slot == SlotId::kHandOver) return (void)hand_over(lane);
+  if (slot == SlotId::kHandOver) {
+    if (out_.kind != DecisionKind::kKeep)
+      (void)hand_over(out_.trajectory, out_.kind == DecisionKind::kBrake, lane);
+    return;
+  }
   const auto stage =
       static_cast<core::StageId>(static_cast<int>(slot) - static_cast<int>(SlotId::kPointCloud));
   if (slot == SlotId::kPlanner) {
@@ -140,12 +144,10 @@ void DecisionProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
     if (report_.site_known) in_.goal_W = report_.site_W;
   }
   pipeline_.run(stage, in_, out_);
-  if (slot == SlotId::kMap && out_.kind == DecisionKind::kBrake) {
-    if (hand_over(lane)) in_.committed = &handed_over_;
-    out_.kind = DecisionKind::kKeep;
-  }
-  if (slot == SlotId::kPlanner) judge();
-  if (slot == SlotId::kGovernor || slot == SlotId::kPlanner)
+  if (slot == SlotId::kMap && out_.early_stop && hand_over(*out_.early_stop, true, lane))
+    in_.committed = &handed_over_;
+  if (slot == SlotId::kSmoother) judge();
+  if (slot == SlotId::kGovernor || slot == SlotId::kSmoother)
     publish(lane.release() + out_.decision.point.deadline);
   if (slot == SlotId::kGovernor) lane.set_period(out_.decision.point.deadline);
 }

@@ -34,7 +34,7 @@ class DecisionProgram final : public core::LaneProgram {
 
   /// No more decisions from here on; any thread.
   void give_up() noexcept { given_up_.store(true, std::memory_order_release); }
-  /// The newest decision: complete once the planner's slot has run.
+  /// The newest decision: complete once the smoother's slot has run.
   [[nodiscard]] const DecisionOutput& output() const noexcept { return out_; }
   [[nodiscard]] std::uint64_t decisions() const noexcept { return decisions_; }
   /// Trajectories that came too late for their own start; never decreases.
@@ -48,8 +48,8 @@ class DecisionProgram final : public core::LaneProgram {
   void publish(MonotonicTime due) noexcept;
   void choose_site() noexcept;
   void judge() noexcept;
-  /// False if there is nothing to hand over, or it is too late for it.
-  bool hand_over(const core::LaneExecutive& lane) noexcept;
+  /// False if it is too late for it.
+  bool hand_over(const Trajectory& trajectory, bool is_stop, const core::LaneExecutive& lane) noexcept;
   /// What the flight lane flies at `now`. What was handed over counts from its start on: the report of that
   /// very frame may not be there yet.
   [[nodiscard]] const Trajectory& flown(MonotonicTime now) const noexcept;

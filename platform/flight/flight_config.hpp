@@ -28,9 +28,9 @@ struct FlightConfig {
   double camera_range_m{25.0};       ///< Of the cameras that the plans rely on. (1, 200]
   governor::Design design{governor::Design::kAware};
   core::CostProfile costs{};  ///< What the stages without knobs cost: their constant is planned for.
-  std::array<governor::LatencyModel, 3> model{};  ///< Map, export, planner.
-  std::uint64_t seed{1};                          ///< Of the planner's random numbers.
-  Nanos minor_frame{core::kMinorFrame};           ///< core::minor_frame_of() a legal rate.
+  governor::KnobArray<governor::LatencyModel> model{};  ///< Map, export, planner.
+  std::uint64_t seed{1};                                ///< Of the planner's random numbers.
+  Nanos minor_frame{core::kMinorFrame};                 ///< core::minor_frame_of() a legal rate.
   bool answers{true};  ///< False: the failsafe sees and records, and does nothing. For tests alone.
 };
 

@@ -16,6 +16,9 @@ constexpr int kAccelBias = 12;
 
 Vector3 to_vector(const std::array<double, 3>& v) noexcept { return {v[0], v[1], v[2]}; }
 
+/// A standard deviation that a measurement can be weighed with.
+bool is_sigma(double sigma) noexcept { return sigma > 0.0 && std::isfinite(sigma); }
+
 Matrix3 skew(const Vector3& v) noexcept {
   Matrix3 m;
   m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
@@ -26,6 +29,10 @@ Matrix3 skew(const Vector3& v) noexcept {
 Quaternion small_rotation(const Vector3& angle_rad) noexcept {
   const Vector3 half = 0.5 * angle_rad;
   return Quaternion(1.0 - 0.5 * half.squaredNorm(), half.x(), half.y(), half.z()).normalized();
+}
+
+bool has_heading(const firmware_if::GnssFix& fix) noexcept {
+  return std::isfinite(fix.heading_rad) && fix.sigma_heading_rad > 0.0;
 }
 
 double yaw_of(const Quaternion& q) noexcept {
@@ -144,16 +151,13 @@ void Estimator::start(const firmware_if::GnssFix& fix) noexcept {
 Status Estimator::update(const firmware_if::GnssFix& fix) noexcept {
   const Vector3 p_W = to_vector(fix.p_WB_m);
   const Vector3 v_W = to_vector(fix.v_WB_mps);
-  const bool sigmas_ok =
-      fix.sigma_horizontal_m > 0.0 && fix.sigma_vertical_m > 0.0 && fix.sigma_speed_mps > 0.0;
-  if (!is_finite(p_W) || !is_finite(v_W) || !sigmas_ok || !std::isfinite(fix.sigma_horizontal_m) ||
-      !std::isfinite(fix.sigma_vertical_m) || !std::isfinite(fix.sigma_speed_mps)) {
+  if (!is_finite(p_W) || !is_finite(v_W) || !is_sigma(fix.sigma_horizontal_m) ||
+      !is_sigma(fix.sigma_vertical_m) || !is_sigma(fix.sigma_speed_mps)) {
     ++counters_.refused_not_finite;
     return Status::kInvalidArgument;
   }
-  const bool heading_ok = std::isfinite(fix.heading_rad) && fix.sigma_heading_rad > 0.0;
   if (!started_) {
-    if (counters_.imu == 0 || !heading_ok) return Status::kNotReady;
+    if (counters_.imu == 0 || !has_heading(fix)) return Status::kNotReady;
     last_gnss_ = fix.stamp;
     start(fix);
     ++counters_.gnss;
@@ -165,8 +169,14 @@ Status Estimator::update(const firmware_if::GnssFix& fix) noexcept {
     return Status::kStale;
   }
   last_gnss_ = fix.stamp;
-  const Vector3 dp = p_W - then->p_WB;
-  const Vector3 dv = v_W - then->v_WB;
+  const bool accepted = correct_by(fix, p_W - then->p_WB, v_W - then->v_WB, yaw_of(then->q_WB));
+  if (accepted) ++counters_.gnss;
+  reset_if_broken();
+  return accepted ? Status::kOk : Status::kInvalidArgument;
+}
+
+bool Estimator::correct_by(const firmware_if::GnssFix& fix, const Vector3& dp, const Vector3& dv,
+                           double yaw_rad) noexcept {
   bool accepted = true;
   for (int i = 0; i < 3; ++i) {
     // The receiver's own slow bias is not white: never trust it below 2 cm.
@@ -174,13 +184,11 @@ Status Estimator::update(const firmware_if::GnssFix& fix) noexcept {
     accepted = correct(kPosition + i, dp[i], sigma_m) && accepted;
   }
   for (int i = 0; i < 3; ++i) accepted = correct(kVelocity + i, dv[i], fix.sigma_speed_mps) && accepted;
-  if (heading_ok) {
-    const double turn_rad = core::wrap_angle(fix.heading_rad - yaw_of(then->q_WB));
+  if (has_heading(fix)) {
+    const double turn_rad = core::wrap_angle(fix.heading_rad - yaw_rad);
     accepted = correct(kAttitude + 2, turn_rad, fix.sigma_heading_rad) && accepted;
   }
-  if (accepted) ++counters_.gnss;
-  reset_if_broken();
-  return accepted ? Status::kOk : Status::kInvalidArgument;
+  return accepted;
 }
 
 Status Estimator::update(const firmware_if::BarometerSample& sample) noexcept {

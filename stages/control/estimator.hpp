@@ -81,6 +81,10 @@ class Estimator {
   void propagate_covariance(double dt_s) noexcept;
   /// One scalar measurement of error state `index`; false if gated out.
   bool correct(int index, double innovation, double sigma) noexcept;
+  /// All measurements of a fix, given its innovations of position and velocity and the yaw estimated then;
+  /// false if one of them is gated out.
+  bool correct_by(const firmware_if::GnssFix& fix, const Vector3& dp, const Vector3& dv,
+                  double yaw_rad) noexcept;
   void reset_if_broken() noexcept;
 
   Config config_;

@@ -27,15 +27,13 @@ class Tracker {
     double tilt_limit_rad{0.60};        ///< 34 degrees: 6.7 m/s2 sideways. (0, 1.2]
     double correction_limit_mps{3.0};   ///< Of the position loop. (0, 20]
     double period_s{0.0025};            ///< The minor frame. (0, 0.1]
-    [[nodiscard]] constexpr Status validate() const noexcept {
-      const bool ok = airframe.mass_kg > 0 && airframe.arm_m > 0 && airframe.max_thrust_N > 0 &&
-                      airframe.yaw_torque_m > 0 && position_gain_Hz > 0 && position_gain_Hz <= 10 &&
-                      velocity_gain_Hz > 0 && velocity_gain_Hz <= 20 && velocity_integral_Hz2 >= 0 &&
-                      velocity_integral_Hz2 <= 20 && integral_limit_mps2 > 0 && integral_limit_mps2 <= 10 &&
-                      attitude_gain_Hz > 0 && attitude_gain_Hz <= 50 && rate_gain_Hz > 0 &&
-                      rate_gain_Hz <= 100 && tilt_limit_rad > 0 && tilt_limit_rad <= 1.2 &&
-                      correction_limit_mps > 0 && correction_limit_mps <= 20 && period_s > 0 &&
-                      period_s <= 0.1;
+    [[nodiscard]] Status validate() const noexcept {
+      const bool ok =
+          airframe.validate() == Status::kOk && core::above(position_gain_Hz, 0.0, 10.0) &&
+          core::above(velocity_gain_Hz, 0.0, 20.0) && core::within(velocity_integral_Hz2, 0.0, 20.0) &&
+          core::above(integral_limit_mps2, 0.0, 10.0) && core::above(attitude_gain_Hz, 0.0, 50.0) &&
+          core::above(rate_gain_Hz, 0.0, 100.0) && core::above(tilt_limit_rad, 0.0, 1.2) &&
+          core::above(correction_limit_mps, 0.0, 20.0) && core::above(period_s, 0.0, 0.1);
       return ok ? Status::kOk : Status::kInvalidArgument;
     }
   };

@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "stages/perception/block_sight.hpp"
+#include "stages/perception/brick_flags.hpp"
 
 namespace roborun::stages {
 namespace {

@@ -39,7 +39,7 @@ Status BrickMap::Config::validate() const noexcept {
   const bool ok = positions <= kMaxPositions && max_bricks >= 64 && max_bricks <= 200000 && max_frames >= 1 &&
                   max_frames <= 8 && max_image_side >= 8 && max_image_side <= DepthPyramid::kMaxPixels &&
                   vehicle_radius_m >= 0.0 && vehicle_radius_m <= 2.0 && depth_margin_m >= 0.0 &&
-                  depth_margin_per_m >= 0.0;
+                  depth_margin_quadratic_per_m >= 0.0;
   return ok ? Status::kOk : Status::kInvalidArgument;
 }
 

@@ -13,6 +13,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 
@@ -21,6 +22,7 @@
 #include "stages/perception/brick.hpp"
 #include "stages/perception/depth_pyramid.hpp"
 #include "stages/perception/frame_guard.hpp"
+#include "stages/perception/image_lines.hpp"
 #include "stages/perception/occupancy_map.hpp"
 
 namespace roborun::stages {
@@ -28,16 +30,16 @@ namespace roborun::stages {
 class BrickMap final : public OccupancyMap, private MapView {
  public:
   struct Config {
-    Aabb bounds_W{Vector3(-100.0, -100.0, -5.0),
-                  Vector3(100.0, 100.0, 20.0)};  ///< Space outside is never stored: unknown.
-    std::size_t max_bricks{9100};                ///< 1,000,000 m3 at 0.3 m. [64, 200000]
-    std::size_t max_frames{
-        6};  ///< Cameras. Space between two images counts as seen only if all arrived. [1, 8]
+    /// Space outside is never stored: unknown.
+    Aabb bounds_W{Vector3(-100.0, -100.0, -5.0), Vector3(100.0, 100.0, 20.0)};
+    std::size_t max_bricks{9100};  ///< 1,000,000 m3 at 0.3 m. [64, 200000]
+    /// Cameras. Space between two images counts as seen only if all arrived. [1, 8]
+    std::size_t max_frames{6};
     std::size_t max_image_side{512};  ///< Pixels. [8, 512]
     double vehicle_radius_m{0.6};     ///< Where the vehicle is, nothing else is: free. [0, 2]
     double depth_margin_m{0.05};      ///< A cell is free only if every pixel sees this much past it ...
-    double depth_margin_per_m{
-        0.0012};  ///< ... plus this times depth squared: three sigma of a stereo camera.
+    /// ... plus this times depth squared, in metres: three sigma of a stereo camera. 1/m, >= 0.
+    double depth_margin_quadratic_per_m{0.0012};
     /// kInvalidArgument if a number is out of range, or the bounds hold more than 4 million bricks.
     [[nodiscard]] Status validate() const noexcept;
   };
@@ -86,7 +88,7 @@ class BrickMap final : public OccupancyMap, private MapView {
     return box_free(box_W, view_level_, view_radius_m_, lookups);
   }
   [[nodiscard]] bool is_free_at_finest(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
-    return box_free(box_W, 0, 1e18, lookups);
+    return box_free(box_W, 0, std::numeric_limits<double>::infinity(), lookups);
   }
   [[nodiscard]] CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept override;
   [[nodiscard]] double cell_m() const noexcept override { return cell_size_m(view_level_); }

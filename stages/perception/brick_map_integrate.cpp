@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "stages/perception/brick_map.hpp"
@@ -44,7 +45,7 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
       continue;
     }
     cameras_.camera[cameras_.count].prepare(posed, *image,
-                                            {config_.depth_margin_m, config_.depth_margin_per_m});
+                                            {config_.depth_margin_m, config_.depth_margin_quadratic_per_m});
     frame_of_[cameras_.count++] = i;
   }
   counters_.frames_refused += result.frames_refused;
@@ -169,7 +170,7 @@ std::size_t BrickMap::order_units(const IntegrationRequest& request) noexcept {
   constexpr std::size_t kBuckets = 256;
   std::array<std::uint32_t, kBuckets> start{};
   const auto key_of = [&request](const Vector3& center_W) {
-    double nearest2 = 1e18;
+    double nearest2 = std::numeric_limits<double>::infinity();
     for (const Vector3& p_W : request.trajectory_W)
       nearest2 = std::min(nearest2, (p_W - center_W).squaredNorm());
     return static_cast<std::uint16_t>(
@@ -452,7 +453,7 @@ Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget&
   vehicle_W_ = cameras_.camera[0].p_WC;
   const std::size_t count = order_units(request);
   const std::size_t done = clear_units(count, request, budget, result.work);
-  reach_m_ = done < count ? 0.0 : 1e18;
+  reach_m_ = done < count ? 0.0 : std::numeric_limits<double>::infinity();
   if (done < count && done > 0) reach_m_ = order_key_[unit_index(unit_at(order_[done - 1]))] * kOrderStep_m;
   free_vehicle();
   if (request.level >= kBrickLevel)

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "stages/perception/brick_map.hpp"
 
@@ -37,7 +38,7 @@ Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& bu
     }
   }
   Status status = Status::kOk;
-  view_radius_m_ = 1e18;
+  view_radius_m_ = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < kBuckets; ++i) {
     const double volume_m3 = static_cast<double>(known[i]) * kCell_m3;
     if (work.volume_m3 + volume_m3 > request.volume_m3 && i > 1) {

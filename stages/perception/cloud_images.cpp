@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "stages/perception/depth_pyramid.hpp"
+#include "stages/perception/depth_steps.hpp"
 
 namespace roborun::stages {
 namespace {

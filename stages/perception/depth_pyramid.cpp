@@ -4,8 +4,6 @@
 #include <bit>
 #include <cmath>
 
-#include "stages/perception/block_sight.hpp"
-
 namespace roborun::stages {
 
 namespace {

@@ -7,18 +7,10 @@
 #include <span>
 
 #include "core/memory/arena.hpp"
+#include "stages/perception/depth_steps.hpp"
 #include "stages/perception/occupancy_map.hpp"
 
 namespace roborun::stages {
-
-inline constexpr float kMaxRange_m = 300.0F;
-inline constexpr float kMaxTanHalfFov = 2.0F;
-
-/// Visible depth of a pixel: its depth, or the range where nothing returned; 0 where there is no information.
-[[nodiscard]] inline float visible_depth_m(float depth_m, float range_m) noexcept {
-  if (!(depth_m > 0.0F)) return 0.0F;
-  return depth_m < range_m ? depth_m : range_m;
-}
 
 /// A pixel without information (NaN or <= 0) whose neighbours above, below, left and right all have some
 /// counts as the nearest of them: a camera loses one pixel in 200 at random, and near cells have thousands.
@@ -31,14 +23,10 @@ inline constexpr float kMaxTanHalfFov = 2.0F;
 class DepthPyramid {
  public:
   static constexpr int kMaxLevels = 11;
-  static constexpr std::size_t kMaxPixels = 512;
-  static constexpr std::int32_t kMaxSteps = 32767;  ///< "Nothing within the range".
+  static constexpr std::size_t kMaxPixels = kMaxImageSide;
+  static constexpr std::int32_t kMaxSteps = DepthEntry::kMaxSteps;
 
-  /// Two bounds in one word, so that both combine by the same minimum.
-  struct Entry {
-    std::int16_t least_steps;     ///< No pixel sees less far; 0 if one has no information.
-    std::int16_t not_most_steps;  ///< kMaxSteps minus what no pixel sees beyond.
-  };
+  using Entry = DepthEntry;
   struct Level {
     const Entry* entry{};
     std::int32_t width{};  ///< Entries a row.

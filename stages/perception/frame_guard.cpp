@@ -5,8 +5,7 @@
 #include <cmath>
 
 #include "core/random/counter_rng.hpp"
-#include "stages/perception/block_sight.hpp"
-#include "stages/perception/depth_pyramid.hpp"
+#include "stages/perception/depth_steps.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -40,8 +39,8 @@ bool is_informed(const PosedDepthFrame& posed, std::size_t informed_count) noexc
 
 Status check_shape(const PosedDepthFrame& posed) noexcept {
   const firmware_if::DepthFrame& f = posed.frame;
-  const bool size_ok = f.width >= 8 && f.height >= 8 && f.width <= DepthPyramid::kMaxPixels &&
-                       f.height <= DepthPyramid::kMaxPixels &&
+  const bool size_ok = f.width >= 8 && f.height >= 8 && f.width <= kMaxImageSide &&
+                       f.height <= kMaxImageSide &&
                        f.depth_m.size() == std::size_t{f.width} * std::size_t{f.height};
   const bool optics_ok = f.range_m > 0.0F && f.range_m <= kMaxRange_m && f.tan_half_fov_ratio > 0.0F &&
                          f.tan_half_fov_ratio <= kMaxTanHalfFov;

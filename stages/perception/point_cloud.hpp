@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "core/executive/stage_budget.hpp"
@@ -69,8 +70,8 @@ class PointCloud {
   FrameGuard guard_{};
   std::size_t count_{0};
   double seen_volume_m3_{0.0};
-  double low_m_{-1e9};
-  double high_m_{1e9};
+  double low_m_{-std::numeric_limits<double>::infinity()};
+  double high_m_{std::numeric_limits<double>::infinity()};
   Counters counters_{};
 };
 static_assert(Stage<PointCloud>);

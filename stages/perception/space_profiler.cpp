@@ -54,7 +54,6 @@ bool profile_points(const SpaceProfilerConfig& config, std::span<const CloudPoin
   }
   double sum_m = 0.0;
   int count = 0;
-  profile.gap_min_m = kInfinity;
   const auto first =
       std::find_if(sector.begin(), sector.end(), [](const Sector& s) { return s.range_m < kInfinity; });
   if (first != sector.end()) {
@@ -70,7 +69,6 @@ bool profile_points(const SpaceProfilerConfig& config, std::span<const CloudPoin
       if (!same_obstacle && gap_m >= config.vehicle_width_m && gap_m <= config.widest_gap_m) {
         sum_m += gap_m;
         ++count;
-        profile.gap_min_m = std::fmin(profile.gap_min_m, gap_m);
       }
       last = s;
     }
@@ -110,7 +108,7 @@ Status profile_space(const SpaceProfilerConfig& config, std::span<const CloudPoi
   const bool all = profile_points(config, points, p_WB, goal_W, relevant_W, budget, work, profile);
   if (!all) {
     profile.closest_obstacle_m = profile.obstacle_ahead_m = 0.0;
-    profile.gap_min_m = profile.gap_average_m = config.vehicle_width_m;
+    profile.gap_average_m = config.vehicle_width_m;
   }
   profile.speed_mps = v_WB.norm();
   const Vector3 ahead_W = profile.speed_mps > 0.2 ? v_WB : Vector3(goal_W - p_WB);

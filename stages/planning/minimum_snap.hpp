@@ -27,9 +27,22 @@ class MinimumSnap {
 
  private:
   using Block = std::array<std::array<double, 4>, 4>;
+  /// Right-hand sides and unknowns of one knot: derivative 1 to 4 by axis.
+  using Rows = std::array<std::array<double, 3>, 4>;
+  struct Chain;
+  struct Link;
+  struct Knot;
+  struct Ends;
 
-  // The integral on [0, 1] as a quadratic form of velocity to snap at both ends (and of the way between
-  // them).
+  // The steps of solve(); the equations stand in the source.
+  void begin_knot(const Link& link, Knot& knot) const noexcept;
+  void subtract_start(const Link& link, const Rows& x0, Knot& knot) const noexcept;
+  static void subtract_before(const Block& coupling, const Rows& z, Knot& knot) noexcept;
+  void complete_knot(const Link& link, Knot& knot, std::size_t k, Chain& chain) const noexcept;
+  static void substitute_back(std::size_t segments, Chain& chain) noexcept;
+  [[nodiscard]] bool fill_axis(const Ends& ends, std::size_t c, PolynomialSegment& segment) const noexcept;
+
+  // The integral on [0, 1] as a quadratic form of velocity to snap at both ends, and of the way between them.
   Block begin_begin_{}, begin_end_{}, end_end_{};
   std::array<double, 4> begin_way_{}, end_way_{};
   /// Coefficients 5 to 9 from what coefficients 0 to 4 leave open at the end.

@@ -1,5 +1,7 @@
 #include "stages/planning/node_grid.hpp"
 
+#include <limits>
+
 namespace roborun::stages {
 namespace {
 
@@ -43,7 +45,7 @@ void NodeGrid::insert(const Vector3& p_W) noexcept {
 
 NodeGrid::Near NodeGrid::nearest(const Vector3& p_W) const noexcept {
   std::int32_t best = 0;
-  double best2 = 1e300;
+  double best2 = std::numeric_limits<double>::infinity();
   if (count_ <= kFewPoints) {
     for (std::size_t i = 0; i < count_; ++i) {
       const double d2 = (point_[i].p_W - p_W).squaredNorm();

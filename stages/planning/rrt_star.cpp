@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/geometry/math.hpp"
 #include "stages/perception/polled_view.hpp"
@@ -39,6 +40,12 @@ Samples in_steps(const Path& path_W, double step_m, const Aabb& bounds_W) noexce
     }
   }
   return points_W;
+}
+
+bool is_well_posed(const PlanRequest& request) noexcept {
+  const Vector3 size = request.bounds_W.size();
+  return is_finite(request.start_W) && is_finite(request.goal_W) && size.minCoeff() > 0.0 &&
+         is_finite(size) && request.radius_m > 0.0 && request.horizon_m > 0.0;
 }
 
 /// A fixed number of lookups.
@@ -271,15 +278,12 @@ void RrtStar::clear(Search& s) noexcept {
 Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::StageBudget& budget,
                      PlanResult& result) noexcept {
   result = {};
-  const Vector3 size = request.bounds_W.size();
-  if (!is_finite(request.start_W) || !is_finite(request.goal_W) || !(size.minCoeff() > 0.0) ||
-      !is_finite(size) || !(request.radius_m > 0.0) || !(request.horizon_m > 0.0)) {
-    return Status::kInvalidArgument;
-  }
+  if (!is_well_posed(request)) return Status::kInvalidArgument;
   core::Work& work = result.work;
   const PolledView view(map, budget, work);
   Spare spare(work);
   const PolledView spare_view(map, spare, work);
+  // 1. Out of what stands where the vehicle is.
   if (!map.is_free(Aabb::around(request.start_W, request.radius_m), work.units))
     return escape(request, spare_view, result);
   const bool goal_bad = !request.bounds_W.contains(request.goal_W) ||
@@ -289,11 +293,13 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
   clear(s);
   const Vector3 target_W = towards_goal(request);
   const double to_target_m = (target_W - request.start_W).norm();
+  // 2. The goal is known free space: a path that ends there.
   if (to_target_m > kShortEdge_m && target_W == request.goal_W && !goal_bad &&
       view.is_free(Aabb::around(target_W, request.radius_m), work.units)) {
     const Status status = connect(s, result);
     if (status != Status::kNoPath) return status;
   }
+  // 3. The straight way, if it is free to its end; otherwise its free part is the first branch of the tree.
   std::int32_t best = 0;
   if (to_target_m > kShortEdge_m) {
     const double free_m = free_distance_m(spare_view, request.start_W, target_W - request.start_W,
@@ -310,6 +316,7 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
       return goal_bad ? Status::kGoalBlocked : Status::kOk;
     }
   }
+  // 4. As near to the goal as known free space reaches.
   return explore(s, map, goal_bad, best, result);
 }
 
@@ -320,8 +327,7 @@ Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32
   core::Work& work = s.work;
   Status status = Status::kOk;
   double best_m = promise_m(node(best), request.goal_W) + detour_m(request, view, node(best).p_W, work.units);
-  double mark_m = best_m;
-  std::uint32_t mark = 0;
+  Patience patience(best_m, config_.patience);
   const Samples kept_W = in_steps(request.kept_W, config_.step_m, request.bounds_W);
   for (std::uint32_t i = 0; i < config_.max_samples && !full(); ++i) {
     if (is_over(s)) {
@@ -331,7 +337,7 @@ Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32
     const Vector3 sample_W = i < kept_W.size() ? kept_W[i] : sample(s);
     // Nothing that starts out longer than the best promise can become better than it.
     if ((sample_W - request.start_W).norm() > best_m) continue;
-    const std::int32_t added = try_extend(s, sample_W, 1e300);
+    const std::int32_t added = try_extend(s, sample_W, std::numeric_limits<double>::infinity());
     if (added >= 0) {
       double promise = promise_m(node(added), request.goal_W);
       if (promise < best_m) promise += detour_m(request, view, node(added).p_W, work.units);
@@ -340,11 +346,7 @@ Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32
         best = added;
       }
     }
-    if (best_m < 0.99 * mark_m) {
-      mark_m = best_m;
-      mark = i;
-    }
-    if (i - mark > config_.patience) break;
+    if (patience.is_over(best_m, i)) break;
   }
 
   // Better than standing still by at least one cell of the view.

@@ -74,6 +74,24 @@ class RrtStar final : public Planner {
     core::CounterRng rng;
   };
 
+  /// Ends a search that has not become better by 1 % for so many samples.
+  class Patience {
+   public:
+    Patience(double best_m, std::uint32_t samples) noexcept : mark_m_(best_m), samples_(samples) {}
+    [[nodiscard]] bool is_over(double best_m, std::uint32_t sample) noexcept {
+      if (best_m < 0.99 * mark_m_) {
+        mark_m_ = best_m;
+        mark_ = sample;
+      }
+      return sample - mark_ > samples_;
+    }
+
+   private:
+    double mark_m_;
+    std::uint32_t mark_{0};
+    std::uint32_t samples_;
+  };
+
   [[nodiscard]] Node& node(std::int32_t index) noexcept { return node_[static_cast<std::size_t>(index)]; }
   [[nodiscard]] bool full() const noexcept { return count_ == node_.size(); }
   /// To be asked before each add_node().
@@ -92,6 +110,12 @@ class RrtStar final : public Planner {
   // The goal is known free space.
   [[nodiscard]] Status connect(Search& s, PlanResult& result) noexcept;
   [[nodiscard]] bool find_first(Search& s) noexcept;
+  /// Informed RRT*: grows the tree where it can still hold a path shorter than `best_W`, of length best_m, and
+  /// pulls what it finds tight. kOk or kBudgetSpent.
+  [[nodiscard]] Status improve(Search& s, double best_m, Path& best_W) noexcept;
+  /// One sample of it: a new node, and by it a shorter way to the goal's node, if there is one. Returns the new
+  /// node, or -1.
+  [[nodiscard]] std::int32_t grow(Search& s, double best_m) noexcept;
   [[nodiscard]] std::int32_t advance(Search& s, std::int32_t from) noexcept;
   [[nodiscard]] Vector3 informed_sample(Search& s, double bound_m) const noexcept;
   [[nodiscard]] bool path_to(std::int32_t node, Path& path_W) const noexcept;

@@ -145,44 +145,30 @@ bool RrtStar::splice(Search& s, std::int32_t from, const Path& best_W, double bo
   return true;
 }
 
-Status RrtStar::connect(Search& s, PlanResult& result) noexcept {
-  const PlanRequest& request = s.request;
-  const bool found = find_first(s);
-  Path best_W;
-  if (!found || !path_to(goal_, best_W)) {
-    clear(s);
-    return Status::kNoPath;
-  }
-  double best_m = node(goal_).cost_m;
-  const auto finish = [&](Status status) {
-    result.path_W = best_W;
-    result.cost_m = length_m(best_W);
-    result.reaches_goal = true;
-    return status;
-  };
-  if (best_m <= request.satisfied_m) return finish(Status::kOk);
-  const double straight_m = (request.goal_W - request.start_W).norm();
-  best_m = shorten(s.view, request.radius_m, kReach_m, kFirstTries, s.rng, best_W, s.work.units);
-  add_path(best_W, s.work);
+std::int32_t RrtStar::grow(Search& s, double best_m) noexcept {
+  const std::int32_t added = try_extend(s, informed_sample(s, best_m), kSlack * best_m);
+  if (added < 0 || full()) return added;
+  const Vector3& goal_W = s.request.goal_W;
+  const double to_goal_m = (goal_W - node(added).p_W).norm();
+  const double cost_m = node(added).cost_m + to_goal_m;
+  if (to_goal_m <= config_.step_m && cost_m < node(goal_).cost_m &&
+      is_segment_free(s.view, node(added).p_W, goal_W, s.request.radius_m, s.work.units))
+    reparent(goal_, added, cost_m);
+  return added;
+}
 
-  Status status = Status::kOk;
-  double mark_m = best_m;
-  std::uint32_t mark = 0;
+Status RrtStar::improve(Search& s, double best_m, Path& best_W) noexcept {
+  const PlanRequest& request = s.request;
+  const double straight_m = (request.goal_W - request.start_W).norm();
+  Patience patience(best_m, config_.patience);
   for (std::uint32_t i = 0; i < config_.max_samples && !full(); ++i) {
+    // Good enough, or as short as any path can be.
     if (best_m <= std::fmax(request.satisfied_m, straight_m * 1.0001)) break;
-    if (is_over(s)) {
-      status = Status::kBudgetSpent;
-      break;
-    }
+    if (is_over(s)) return Status::kBudgetSpent;
     const double before_m = node(goal_).cost_m;
-    const std::int32_t added = try_extend(s, informed_sample(s, best_m), kSlack * best_m);
-    if (added >= 0 && !full()) {
-      const double to_goal_m = (request.goal_W - node(added).p_W).norm();
-      const double cost_m = node(added).cost_m + to_goal_m;
-      if (to_goal_m <= config_.step_m && cost_m < node(goal_).cost_m &&
-          is_segment_free(s.view, node(added).p_W, request.goal_W, request.radius_m, s.work.units))
-        reparent(goal_, added, cost_m);
-    }
+    const std::int32_t added = grow(s, best_m);
+    // A path to pull tight: the tree's new one, or one around the other side of an obstacle, or once in a while
+    // the best one again, with other draws.
     Path candidate_W;
     const bool other =
         node(goal_).cost_m < before_m - 1e-6
@@ -198,13 +184,30 @@ Status RrtStar::connect(Search& s, PlanResult& result) noexcept {
         if (best_m < node(goal_).cost_m - 1e-3) add_path(best_W, s.work);
       }
     }
-    if (best_m < 0.99 * mark_m) {
-      mark_m = best_m;
-      mark = i;
-    }
-    if (i - mark > config_.patience) break;
+    if (patience.is_over(best_m, i)) break;
   }
-  return finish(status);
+  return Status::kOk;
+}
+
+Status RrtStar::connect(Search& s, PlanResult& result) noexcept {
+  const PlanRequest& request = s.request;
+  const bool found = find_first(s);
+  Path best_W;
+  if (!found || !path_to(goal_, best_W)) {
+    clear(s);
+    return Status::kNoPath;
+  }
+  Status status = Status::kOk;
+  if (!(node(goal_).cost_m <= request.satisfied_m)) {
+    const double best_m =
+        shorten(s.view, request.radius_m, kReach_m, kFirstTries, s.rng, best_W, s.work.units);
+    add_path(best_W, s.work);
+    status = improve(s, best_m, best_W);
+  }
+  result.path_W = best_W;
+  result.cost_m = length_m(best_W);
+  result.reaches_goal = true;
+  return status;
 }
 
 }  // namespace roborun::stages

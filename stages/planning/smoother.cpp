@@ -5,9 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "core/memory/static_vector.hpp"
-#include "stages/perception/polled_view.hpp"
-
 namespace roborun::stages {
 namespace {
 
@@ -24,16 +21,21 @@ constexpr int kSamples = 12;         // per segment, for the limits
 constexpr int kStretchRounds = 10;
 constexpr int kSplitRounds = 6;
 constexpr int kSlowRounds = 4;
+constexpr double kMaxStart_mps = 50.0;  // a state that is faster is no state of this vehicle
 
-/// Distance needed to change between two speeds.
+/// Distance needed to change between two speeds: v1^2 = v0^2 + 2 a s.
 double change_m(double from_mps, double to_mps, double a_mps2) noexcept {
   return std::fabs(to_mps * to_mps - from_mps * from_mps) / (2.0 * a_mps2);
 }
 
+/// The speed at which an arc that cuts the corner by kCornerCut_m needs no more than a_mps2 across. With h half
+/// the turn, an arc of radius r leaves the corner by r (1 / cos h - 1), and v^2 = a r; so
+///   v^2 = a cut cos h / (1 - cos h)
+/// Straight on: +infinity.
 double corner_speed_mps(const Vector3& before, const Vector3& after, double a_mps2) noexcept {
   const double cosine = std::clamp(before.normalized().dot(after.normalized()), -1.0, 1.0);
   const double half = std::sqrt(0.5 * (1.0 + cosine));  // cosine of half the turn
-  if (half > 0.9999) return 1e9;
+  if (half > 0.9999) return std::numeric_limits<double>::infinity();
   return std::sqrt(a_mps2 * kCornerCut_m * half / (1.0 - half));
 }
 
@@ -53,18 +55,25 @@ void add_motion(const PolynomialSegment& segment, double at_s, double& speed2, d
   jerk2 = std::max(jerk2, 4.0 * half_j_W.squaredNorm());
 }
 
-}  // namespace
+bool is_well_posed(const SmoothRequest& request) noexcept {
+  const MotionLimits& limits = request.limits;
+  return is_finite(request.start) && limits.speed_mps > 0.0 && limits.speed_mps <= 30.0 &&
+         limits.acceleration_mps2 > 0.0 && limits.acceleration_mps2 <= 20.0 && request.radius_m > 0.0 &&
+         request.start.v_W.norm() <= kMaxStart_mps;
+}
 
-bool Smoother::allocate(std::span<const Vector3> path_W, const TrajectoryPoint& start,
-                        const MotionLimits& limits, Plan& plan) const noexcept {
+using Speeds = std::array<double, MinimumSnap::kMaxKnots>;
+
+/// Steps 1 and 2 of allocate(): the highest speed at each point of the path from which every later corner, and
+/// the stop at the end, can still be braked for: v_i^2 <= v_(i+1)^2 + 2 a length.
+void limit_speeds(std::span<const Vector3> path_W, const TrajectoryPoint& start, double limit_mps,
+                  double a_mps2, Speeds& speed_mps) noexcept {
   const std::size_t n = path_W.size();
-  const double a_mps2 = kProfileShare * limits.acceleration_mps2;
-  std::array<double, kMaxKnots> speed_mps{};
   const Vector3 first = (path_W[1] - path_W[0]).normalized();
   speed_mps[0] = std::max(start.v_W.dot(first), 0.0);
   for (std::size_t i = 1; i + 1 < n; ++i) {
-    speed_mps[i] = std::min(limits.speed_mps,
-                            corner_speed_mps(path_W[i] - path_W[i - 1], path_W[i + 1] - path_W[i], a_mps2));
+    speed_mps[i] =
+        std::min(limit_mps, corner_speed_mps(path_W[i] - path_W[i - 1], path_W[i + 1] - path_W[i], a_mps2));
   }
   speed_mps[n - 1] = 0.0;
   for (std::size_t i = n - 1; i-- > 1;) {
@@ -72,55 +81,86 @@ bool Smoother::allocate(std::span<const Vector3> path_W, const TrajectoryPoint& 
     speed_mps[i] =
         std::min(speed_mps[i], std::sqrt(speed_mps[i + 1] * speed_mps[i + 1] + 2.0 * a_mps2 * length_m));
   }
-  plan.count = 0;
-  const auto add = [&plan](const Vector3& p_W, double time_s) {
-    if (plan.count == kMaxKnots) return false;
-    plan.knot_W[plan.count] = p_W;
-    plan.time_s[plan.count++] = std::max(time_s, kMinSegment_s);
-    return true;
-  };
-  if (!add(path_W[0], 0.0)) return false;
-  for (std::size_t i = 0; i + 1 < n; ++i) {
-    const Vector3 way = path_W[i + 1] - path_W[i];
-    const double length_m = way.norm();
-    const double v0 = speed_mps[i];
-    // Forward: what can be reached from here.
-    speed_mps[i + 1] = std::min(speed_mps[i + 1], std::sqrt(v0 * v0 + 2.0 * a_mps2 * length_m));
-    const double v1 = speed_mps[i + 1];
+}
+
+}  // namespace
+
+/// The trapezoidal speed profile of one straight piece: up to a peak, cruise, down.
+struct Smoother::SpeedProfile {
+  double up_m, cruise_m, down_m;
+  double up_s, cruise_s, down_s;
+
+  /// Without a limit, up and down meet where (peak^2 - v0^2) / 2a + (peak^2 - v1^2) / 2a = length, that is
+  /// at peak^2 = a length + (v0^2 + v1^2) / 2. Times are distances over mean speeds.
+  SpeedProfile(double length_m, double v0, double v1, double limit_mps, double a_mps2) noexcept {
     const double peak = std::max(
-        {std::min(limits.speed_mps, std::sqrt(std::max(a_mps2 * length_m + 0.5 * (v0 * v0 + v1 * v1), 0.0))),
-         v1, 0.05});
-    const double up_m = std::min(change_m(v0, peak, a_mps2), length_m);
-    const double down_m = std::min(change_m(peak, v1, a_mps2), length_m - up_m);
-    const double cruise_m = std::max(length_m - up_m - down_m, 0.0);
-    const double up_s = 2.0 * up_m / (v0 + peak);
-    const double cruise_s = cruise_m / peak;
-    const double down_s = 2.0 * down_m / (peak + v1);
-    const bool last = i + 2 == n;
-    // Knots where the speed profile bends, if the pieces are long enough to be worth one.
-    double pending_s = up_s;
-    if (up_m > 1.5 && cruise_m + down_m > 1.5) {
-      if (!add(path_W[i] + way * (up_m / length_m), up_s)) return false;
-      pending_s = 0.0;
-      // Long cruises are held by way-points: a single polynomial would sag between its ends.
-      const int pieces = std::min(static_cast<int>(cruise_m / kCruisePiece_m), 6);
-      for (int k = 1; k <= pieces; ++k) {
-        const double share = static_cast<double>(k) / (pieces + 1);
-        if (!add(path_W[i] + way * ((up_m + share * cruise_m) / length_m), cruise_s / (pieces + 1)))
-          return false;
-      }
-      pending_s += cruise_s / (pieces + 1);
-    } else {
-      pending_s += cruise_s;
+        {std::min(limit_mps, std::sqrt(std::max(a_mps2 * length_m + 0.5 * (v0 * v0 + v1 * v1), 0.0))), v1,
+         0.05});
+    up_m = std::min(change_m(v0, peak, a_mps2), length_m);
+    down_m = std::min(change_m(peak, v1, a_mps2), length_m - up_m);
+    cruise_m = std::max(length_m - up_m - down_m, 0.0);
+    up_s = 2.0 * up_m / (v0 + peak);
+    cruise_s = cruise_m / peak;
+    down_s = 2.0 * down_m / (peak + v1);
+  }
+};
+
+bool Smoother::Plan::add(const Vector3& p_W, double duration_s) noexcept {
+  if (count == kMaxKnots) return false;
+  knot_W[count] = p_W;
+  time_s[count++] = std::max(duration_s, kMinSegment_s);
+  return true;
+}
+
+/// Step 4 of allocate(): knots where the speed profile bends, if the pieces are long enough to be worth one.
+bool Smoother::Plan::add_piece(const Vector3& from_W, const Vector3& to_W, const SpeedProfile& p,
+                               bool last) noexcept {
+  const Vector3 way = to_W - from_W;
+  const double length_m = way.norm();
+  double pending_s = p.up_s;  // since the last knot
+  if (p.up_m > 1.5 && p.cruise_m + p.down_m > 1.5) {
+    if (!add(from_W + way * (p.up_m / length_m), p.up_s)) return false;
+    pending_s = 0.0;
+    // Long cruises are held by way-points: a single polynomial would sag between its ends.
+    const int pieces = std::min(static_cast<int>(p.cruise_m / kCruisePiece_m), 6);
+    for (int k = 1; k <= pieces; ++k) {
+      const double share = static_cast<double>(k) / (pieces + 1);
+      if (!add(from_W + way * ((p.up_m + share * p.cruise_m) / length_m), p.cruise_s / (pieces + 1)))
+        return false;
     }
-    if (down_m > (last ? 0.3 : 1.5) && cruise_m + up_m > 1.0 && (pending_s > kMinSegment_s)) {
-      if (cruise_m > 0.3 || pending_s > cruise_s) {
-        if (!add(path_W[i] + way * ((up_m + cruise_m) / length_m), pending_s)) return false;
-        pending_s = 0.0;
-      }
-    }
-    if (last) plan.brake_knot = plan.count - 1;
-    if (!add(path_W[i + 1], pending_s + down_s)) return false;
+    pending_s += p.cruise_s / (pieces + 1);
+  } else {
+    pending_s += p.cruise_s;
+  }
+  // Where braking begins. The final braking is worth a knot sooner: the tail is flown when a decision is late.
+  if (p.down_m > (last ? 0.3 : 1.5) && p.cruise_m + p.up_m > 1.0 && pending_s > kMinSegment_s &&
+      (p.cruise_m > 0.3 || pending_s > p.cruise_s)) {
+    if (!add(from_W + way * ((p.up_m + p.cruise_m) / length_m), pending_s)) return false;
+    pending_s = 0.0;
+  }
+  if (last) brake_knot = count - 1;
+  return add(to_W, pending_s + p.down_s);
+}
+
+/// Times for the path under the limits:
+///  1. the speed at each corner,
+///  2. backwards: no faster than what can be braked to the next point's speed,
+///  3. forwards: no faster than what can be reached from the point before,
+///  4. between them a trapezoidal profile, with knots where it bends.
+bool Smoother::allocate(std::span<const Vector3> path_W, const TrajectoryPoint& start,
+                        const MotionLimits& limits, Plan& plan) noexcept {
+  const std::size_t n = path_W.size();
+  const double a_mps2 = kProfileShare * limits.acceleration_mps2;
+  Speeds speed_mps{};
+  limit_speeds(path_W, start, limits.speed_mps, a_mps2, speed_mps);
+  plan.count = 0;
+  if (!plan.add(path_W[0], 0.0)) return false;
+  for (std::size_t i = 0; i + 1 < n; ++i) {
+    const double length_m = (path_W[i + 1] - path_W[i]).norm();
+    const double v0 = speed_mps[i];
+    speed_mps[i + 1] = std::min(speed_mps[i + 1], std::sqrt(v0 * v0 + 2.0 * a_mps2 * length_m));
+    const SpeedProfile profile(length_m, v0, speed_mps[i + 1], limits.speed_mps, a_mps2);
+    if (!plan.add_piece(path_W[i], path_W[i + 1], profile, i + 2 == n)) return false;
   }
   return true;
 }
@@ -133,14 +173,14 @@ bool Smoother::solve(const Plan& plan, const TrajectoryPoint& start, Trajectory&
   return true;
 }
 
-bool Smoother::stretch_to_limits(Plan& plan, const SmoothRequest& request, const MotionLimits& limits,
-                                 core::StageBudget& budget, const core::Work& work,
+bool Smoother::stretch_to_limits(const Task& task, const MotionLimits& limits, Plan& plan,
                                  Trajectory& out) const noexcept {
+  const SmoothRequest& request = task.request;
   const double speed_limit = std::max(limits.speed_mps * kLimitTolerance, request.start.v_W.norm() + 0.01);
   const double acceleration_limit =
       std::max(limits.acceleration_mps2 * kLimitTolerance, request.start.a_W.norm() + 0.01);
   const double jerk_limit = std::max(kJerk_mps3 * kLimitTolerance, request.start.j_W.norm() + 0.01);
-  for (int round = 0; round < kStretchRounds && !budget.spent(work); ++round) {
+  for (int round = 0; round < kStretchRounds && !task.budget.spent(task.work); ++round) {
     if (!solve(plan, request.start, out)) return false;
     bool fine = true;
     for (std::size_t k = 0; k < out.segment_count; ++k) {
@@ -150,7 +190,8 @@ bool Smoother::stretch_to_limits(Plan& plan, const SmoothRequest& request, const
       double jerk2 = 0.0;
       for (int i = 0; i <= kSamples; ++i)
         add_motion(out.segment[k], out.segment[k].duration_s * i / kSamples, speed2, acceleration2, jerk2);
-      // By how much longer the segment must be: the cube root is near enough to the power 3/8.
+      // A time that is k times as long divides speed by k, acceleration by k^2 and jerk by k^3. The cube root
+      // of the jerk's excess is near enough to its power 3/8, which square roots can make.
       const double jerk_root = std::sqrt(std::sqrt(std::sqrt(std::sqrt(jerk2) / jerk_limit)));
       const double worst = std::max({1.0, std::sqrt(speed2) / speed_limit,
                                      std::sqrt(std::sqrt(acceleration2) / acceleration_limit),
@@ -165,81 +206,96 @@ bool Smoother::stretch_to_limits(Plan& plan, const SmoothRequest& request, const
   return false;
 }
 
+bool Smoother::split(const Plan& plan, std::size_t segment, Path& path_W) noexcept {
+  const Vector3 middle_W = 0.5 * (plan.knot_W[segment] + plan.knot_W[segment + 1]);
+  std::size_t piece = 0;
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i + 1 < path_W.size(); ++i) {
+    const Vector3 way = path_W[i + 1] - path_W[i];
+    const double along = std::clamp((middle_W - path_W[i]).dot(way) / way.squaredNorm(), 0.0, 1.0);
+    const double distance_m = (path_W[i] + along * way - middle_W).norm();
+    if (distance_m < nearest_m) {
+      nearest_m = distance_m;
+      piece = i;
+    }
+  }
+  if ((path_W[piece + 1] - path_W[piece]).norm() < 4.0 * kSameWaypoint_m) return false;
+  Path finer;
+  bool fits = true;
+  for (std::size_t i = 0; i < path_W.size(); ++i) {
+    fits = finer.push_back(path_W[i]) && fits;
+    if (i == piece) fits = finer.push_back(0.5 * (path_W[i] + path_W[i + 1])) && fits;
+  }
+  if (fits) path_W = finer;
+  return fits;
+}
+
+Status Smoother::curve(const Task& task, const Path& path_W, const MotionLimits& limits,
+                       Trajectory& out) const noexcept {
+  Path path = path_W;
+  Plan plan;
+  for (int round = 0; round <= kSplitRounds; ++round) {
+    if (task.budget.spent(task.work)) return Status::kBudgetSpent;
+    if (!allocate({path.begin(), path.size()}, task.request.start, limits, plan)) return Status::kNoPath;
+    if (!stretch_to_limits(task, limits, plan, out)) return Status::kNoPath;
+    std::size_t bad = 0;
+    if (is_trajectory_free(task.view, out, 0.0, task.request.radius_m, task.work.units, &bad))
+      return Status::kOk;
+    if (!split(plan, bad, path)) return Status::kNoPath;
+  }
+  return Status::kNoPath;
+}
+
+Status Smoother::straight_pieces(const Task& task, const Path& path_W, Trajectory& out) noexcept {
+  const SmoothRequest& request = task.request;
+  if (request.start.v_W.norm() > kAtRest || request.start.a_W.norm() > kAtRest) return Status::kNoPath;
+  out.segment_count = 0;
+  for (std::size_t i = 0; i + 1 < path_W.size(); ++i) {
+    if (!append_rest_to_rest(path_W[i], path_W[i + 1], request.limits, out)) return Status::kNoPath;
+  }
+  if (is_trajectory_free(task.view, out, 0.0, request.radius_m, task.work.units)) return Status::kOk;
+  return task.view.spent() ? Status::kBudgetSpent : Status::kNoPath;
+}
+
 Status Smoother::smooth(const SmoothRequest& request, const MapView& map, core::StageBudget& budget,
                         SmoothResult& result) noexcept {
+  // 1. The path from the start state on, without points that stand for the same place.
   result.work = {};
-  const bool finite = is_finite(request.start.p_W) && is_finite(request.start.v_W) &&
-                      is_finite(request.start.a_W) && is_finite(request.start.j_W) &&
-                      request.limits.speed_mps > 0.0 && request.limits.speed_mps <= 30.0 &&
-                      request.limits.acceleration_mps2 > 0.0 && request.limits.acceleration_mps2 <= 20.0 &&
-                      request.radius_m > 0.0;
-  if (!finite || request.start.v_W.norm() > 50.0) return Status::kInvalidArgument;
-  core::StaticVector<Vector3, kMaxKnots> original;
+  if (!is_well_posed(request)) return Status::kInvalidArgument;
+  Path path;
   for (const Vector3& p_W : request.path_W) {
     if (!is_finite(p_W)) return Status::kInvalidArgument;
-    if (!original.empty() && (p_W - original.back()).norm() < kSameWaypoint_m) continue;
-    if (!original.push_back(original.empty() ? request.start.p_W : p_W)) break;
+    if (!path.empty() && (p_W - path.back()).norm() < kSameWaypoint_m) continue;
+    if (!path.push_back(path.empty() ? request.start.p_W : p_W)) break;
   }
-  if (original.size() < 2) return Status::kInvalidArgument;
+  if (path.size() < 2) return Status::kInvalidArgument;
 
+  // 2. A curve; slower if there is none.
   const PolledView view(map, budget, result.work);
+  const Task task{request, view, budget, result.work};
   MotionLimits limits = request.limits;
   Trajectory candidate;
   candidate.start_time = request.start_time;
-  Plan plan;
   for (int slow = 0; slow < kSlowRounds; ++slow, limits.speed_mps *= 0.6) {
-    core::StaticVector<Vector3, kMaxKnots> path = original;
-    for (int split = 0; split <= kSplitRounds; ++split) {
-      if (budget.spent(result.work)) return Status::kBudgetSpent;
-      if (!allocate({path.begin(), path.size()}, request.start, limits, plan)) break;
-      if (!stretch_to_limits(plan, request, limits, budget, result.work, candidate)) break;
-      std::size_t bad = 0;
-      if (is_trajectory_free(view, candidate, 0.0, request.radius_m, result.work.units, &bad)) {
-        result.trajectory = candidate;
-        return Status::kOk;
-      }
-      // One more way-point in the middle of the straight piece that the bad segment belongs to.
-      const Vector3 middle = 0.5 * (plan.knot_W[bad] + plan.knot_W[bad + 1]);
-      std::size_t piece = 0;
-      double nearest_m = 1e300;
-      for (std::size_t i = 0; i + 1 < path.size(); ++i) {
-        const Vector3 way = path[i + 1] - path[i];
-        const double along = std::clamp((middle - path[i]).dot(way) / way.squaredNorm(), 0.0, 1.0);
-        const double distance_m = (path[i] + along * way - middle).norm();
-        if (distance_m < nearest_m) {
-          nearest_m = distance_m;
-          piece = i;
-        }
-      }
-      if ((path[piece + 1] - path[piece]).norm() < 4.0 * kSameWaypoint_m) break;
-      core::StaticVector<Vector3, kMaxKnots> finer;
-      bool fits = true;
-      for (std::size_t i = 0; i < path.size(); ++i) {
-        fits = finer.push_back(path[i]) && fits;
-        if (i == piece) fits = finer.push_back(0.5 * (path[i] + path[i + 1])) && fits;
-      }
-      if (!fits) break;
-      path = finer;
-    }
+    const Status status = curve(task, path, limits, candidate);
+    if (status == Status::kBudgetSpent) return status;
+    if (status != Status::kOk) continue;
+    result.trajectory = candidate;
+    return Status::kOk;
   }
   if (budget.spent(result.work)) return Status::kBudgetSpent;
-  if (request.start.v_W.norm() > kAtRest || request.start.a_W.norm() > kAtRest) return Status::kNoPath;
-  candidate.segment_count = 0;
-  for (std::size_t i = 0; i + 1 < original.size(); ++i) {
-    if (!append_rest_to_rest(original[i], original[i + 1], request.limits, candidate)) return Status::kNoPath;
-  }
-  if (!is_trajectory_free(view, candidate, 0.0, request.radius_m, result.work.units))
-    return view.spent() ? Status::kBudgetSpent : Status::kNoPath;
-  result.trajectory = candidate;
-  return Status::kOk;
+
+  // 3. The last resort.
+  const Status status = straight_pieces(task, path, candidate);
+  if (status == Status::kOk) result.trajectory = candidate;
+  return status;
 }
 
 Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, const MotionLimits& limits,
                        Trajectory& out) const noexcept {
   const double speed_mps = start.v_W.norm();
-  const bool finite =
-      is_finite(start.p_W) && is_finite(start.v_W) && is_finite(start.a_W) && is_finite(start.j_W);
-  if (!finite || speed_mps > 50.0 || !(limits.acceleration_mps2 > 0.0)) return Status::kInvalidArgument;
+  if (!is_finite(start) || speed_mps > kMaxStart_mps || !(limits.acceleration_mps2 > 0.0))
+    return Status::kInvalidArgument;
   if (speed_mps < 0.02) {
     out = Trajectory::hold(start.p_W, start_time);
     return Status::kOk;

@@ -3,12 +3,14 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "core/executive/stage_budget.hpp"
+#include "core/memory/static_vector.hpp"
 #include "core/trajectory.hpp"
 #include "firmware_if/status.hpp"
-#include "stages/perception/map_view.hpp"
+#include "stages/perception/polled_view.hpp"
 #include "stages/planning/minimum_snap.hpp"
 
 namespace roborun::stages {
@@ -53,20 +55,42 @@ class Smoother {
 
  private:
   static constexpr std::size_t kMaxKnots = MinimumSnap::kMaxKnots;
+  struct SpeedProfile;
   struct Plan {
     std::size_t count{};  ///< Knots.
     std::array<Vector3, kMaxKnots> knot_W;
     std::array<double, kMaxKnots> time_s;  ///< Of the segment that ends at the knot.
     std::size_t brake_knot{};              ///< Where the final braking begins.
+
+    /// False if there is no room for another knot.
+    [[nodiscard]] bool add(const Vector3& p_W, double duration_s) noexcept;
+    [[nodiscard]] bool add_piece(const Vector3& from_W, const Vector3& to_W, const SpeedProfile& profile,
+                                 bool last) noexcept;
   };
 
-  [[nodiscard]] bool allocate(std::span<const Vector3> path_W, const TrajectoryPoint& start,
-                              const MotionLimits& limits, Plan& plan) const noexcept;
+  /// What one call of smooth() works on.
+  struct Task {
+    const SmoothRequest& request;
+    const PolledView& view;
+    core::StageBudget& budget;
+    core::Work& work;
+  };
+  using Path = core::StaticVector<Vector3, kMaxKnots>;
+
+  [[nodiscard]] static bool allocate(std::span<const Vector3> path_W, const TrajectoryPoint& start,
+                                     const MotionLimits& limits, Plan& plan) noexcept;
   [[nodiscard]] bool solve(const Plan& plan, const TrajectoryPoint& start, Trajectory& out) const noexcept;
   /// False if the limits cannot be met, or the budget is spent.
-  [[nodiscard]] bool stretch_to_limits(Plan& plan, const SmoothRequest& request, const MotionLimits& limits,
-                                       core::StageBudget& budget, const core::Work& work,
+  [[nodiscard]] bool stretch_to_limits(const Task& task, const MotionLimits& limits, Plan& plan,
                                        Trajectory& out) const noexcept;
+  /// One more way-point in the middle of the straight piece that a segment of the curve belongs to. False if
+  /// there is no room for it.
+  [[nodiscard]] static bool split(const Plan& plan, std::size_t segment, Path& path_W) noexcept;
+  /// A free curve under these limits. kOk, kBudgetSpent, or kNoPath: slower, perhaps.
+  [[nodiscard]] Status curve(const Task& task, const Path& path_W, const MotionLimits& limits,
+                             Trajectory& out) const noexcept;
+  /// The last resort from rest: straight pieces with a stop at each corner.
+  [[nodiscard]] static Status straight_pieces(const Task& task, const Path& path_W, Trajectory& out) noexcept;
 
   MinimumSnap minimum_snap_;
 };
@@ -84,7 +108,8 @@ class Smoother {
 [[nodiscard]] inline bool is_trajectory_free(const MapView& view, const Trajectory& trajectory, double from_s,
                                              double radius_m, std::uint64_t& lookups,
                                              std::size_t* segment = nullptr) noexcept {
-  return free_until_s(view, trajectory, from_s, radius_m, lookups, segment) > 1e300;
+  return free_until_s(view, trajectory, from_s, radius_m, lookups, segment) ==
+         std::numeric_limits<double>::infinity();
 }
 
 }  // namespace roborun::stages

@@ -31,12 +31,5 @@ TEST(CostProfile, ClampsLevelsAndNegativeWork) {
   EXPECT_EQ(cost_s(StageId::kMap, -1e9, 0), cost_s(StageId::kMap, 0.0, 0));
 }
 
-TEST(VirtualBudget, IsSpentWhenTheWorkWouldHaveTakenTheTime) {
-  const CostProfile profile = paper_profile();
-  VirtualBudget sut(profile, StageId::kPlanner, from_seconds(0.37));
-  EXPECT_FALSE(sut.spent({0, 9.99e3, 0}));
-  EXPECT_TRUE(sut.spent({0, 10.01e3, 0}));
-}
-
 }  // namespace
 }  // namespace roborun::core

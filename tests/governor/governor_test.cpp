@@ -30,7 +30,6 @@ GovernorConfig paper_config(Design design) {
 SpaceProfile open_space(double visible_m, double speed_mps) {
   SpaceProfile p;
   p.gap_average_m = kInfinity;
-  p.gap_min_m = kInfinity;
   p.closest_obstacle_m = kInfinity;
   p.closest_unknown_m = visible_m;
   p.sensor_volume_m3 = 30e3;

@@ -132,7 +132,7 @@ TEST_F(Anytime, Profile) {
   EXPECT_EQ(run(at_once).first, Status::kBudgetSpent);
   EXPECT_EQ(profile.closest_obstacle_m, 0.0);
   EXPECT_EQ(profile.closest_unknown_m, 0.0);
-  EXPECT_EQ(profile.gap_min_m, SpaceProfilerConfig{}.vehicle_width_m);
+  EXPECT_EQ(profile.gap_average_m, SpaceProfilerConfig{}.vehicle_width_m);
   ASSERT_GT(profile.outlook_count, 10U);
   for (std::size_t i = 0; i < profile.outlook_count; ++i) {
     if (profile.outlook[i].speed_mps > 0.05) {

@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <tuple>
 #include <vector>
 
 #include "core/precision.hpp"
 #include "core/record/state_hash.hpp"
-#include "stages/perception/depth_pyramid.hpp"
+#include "stages/perception/depth_steps.hpp"
 #include "stages/perception/frame_guard.hpp"
 
 namespace roborun::stages {
@@ -119,7 +120,7 @@ class OctomapBackend final : public OccupancyMap, private MapView {
       std::vector<std::pair<double, Vector3>> ends;
       for (const auto& [key, mean] : cells) {
         const Vector3 p_W = mean.sum_W / mean.count;
-        double nearest_m = 1e18;
+        double nearest_m = std::numeric_limits<double>::infinity();
         for (const Vector3& q_W : request.trajectory_W) nearest_m = std::min(nearest_m, (p_W - q_W).norm());
         ends.emplace_back(nearest_m, p_W);
       }

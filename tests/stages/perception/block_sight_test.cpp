@@ -9,6 +9,7 @@
 
 #include "core/random/counter_rng.hpp"
 #include "stages/perception/brick_map.hpp"
+#include "stages/perception/instruction_sets.hpp"
 #include "tests/stages/perception/scene.hpp"
 
 namespace roborun::stages {
@@ -24,8 +25,8 @@ Matrix3 tilted() {
 
 /// Restores the choice of the machine.
 struct InstructionSet {
-  explicit InstructionSet(std::int64_t set) { use_sight_instruction_sets(set); }
-  ~InstructionSet() { use_sight_instruction_sets(~std::int64_t{0}); }
+  explicit InstructionSet(std::int64_t set) { use_kernel_instruction_sets(set); }
+  ~InstructionSet() { use_kernel_instruction_sets(~std::int64_t{0}); }
   InstructionSet(const InstructionSet&) = delete;
   InstructionSet& operator=(const InstructionSet&) = delete;
 };
@@ -47,7 +48,7 @@ TEST_F(BlockSight, IsBitEqualOnEveryInstructionSet) {
   const std::array<Vector3, 1> here{Vector3(0.1, 0.2, 5.0)};
   std::vector<std::uint64_t> digests;
   int sets = 0;
-  const std::int64_t all = sight_instruction_sets();
+  const std::int64_t all = kernel_instruction_sets();
   for (unsigned bit = 0; bit < 63; ++bit) {
     const std::int64_t set = all & (std::int64_t{1} << bit);
     if (set == 0) continue;
@@ -83,7 +84,7 @@ TEST_F(BlockSight, ATileKnowsTheLeastAndTheMostOfItsDepths) {
               infinity = std::numeric_limits<float>::infinity();
   const std::array<float, 9> odd{nan, -nan, 0.0F, -0.0F, -1.0F, infinity, -infinity, 700.0F, kRange_m};
   core::CounterRng rng(3);
-  const std::int64_t all = sight_instruction_sets();
+  const std::int64_t all = kernel_instruction_sets();
   for (int n = 0; n < 4000; ++n) {
     const std::int64_t set = all & (std::int64_t{1} << rng.below(63));
     if (set == 0) continue;

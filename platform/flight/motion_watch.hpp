@@ -1,0 +1,49 @@
+/// Notices what moves near the vehicle: surfaces where the map knew free space.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "core/executive/stage_budget.hpp"
+#include "core/geometry/vector.hpp"
+#include "core/memory/static_vector.hpp"
+#include "firmware_if/time.hpp"
+#include "stages/perception/map_view.hpp"
+#include "stages/perception/point_cloud.hpp"
+
+namespace roborun::flight {
+
+/// RT-safe: O(points of the cloud), no allocation.
+class MotionWatch {
+ public:
+  static constexpr std::size_t kTraces = 64;
+  using Places = core::StaticVector<Vector3, kTraces>;
+
+  struct Input {
+    MonotonicTime now{};
+    Vector3 p_WB = Vector3::Zero();
+    Vector3 v_WB = Vector3::Zero();
+    Aabb relevant_W{};  ///< What moves outside of it does not matter.
+  };
+
+  /// Compares the cloud of this decision with `known`, the map before it gets the same images. Not behind the
+  /// vehicle: who is followed must not slow down. `work.units` counts map lookups.
+  void sense(const Input& in, std::span<const stages::CloudPoint> points, const stages::MapView& known,
+             core::StageBudget& budget, core::Work& work) noexcept;
+  /// Something was seen to move within the last seconds.
+  [[nodiscard]] bool moving(MonotonicTime now) const noexcept { return now < moving_until_; }
+  /// Where something was seen to move, for as long as the map may remember what has gone.
+  [[nodiscard]] Places places_W(MonotonicTime now) const noexcept;
+
+ private:
+  struct Trace {
+    Vector3 p_W = Vector3::Zero();
+    MonotonicTime until{};
+  };
+  MonotonicTime moving_until_{};
+  std::array<Trace, kTraces> trace_{};  ///< A ring.
+  std::size_t next_trace_{0};
+};
+
+}  // namespace roborun::flight
