@@ -6,7 +6,7 @@
 #include "core/space_profile.hpp"
 #include "firmware_if/status.hpp"
 #include "firmware_if/time.hpp"
-#include "governor/models/stopping_model.hpp"
+#include "core/stopping_model.hpp"
 
 namespace roborun::governor {
 

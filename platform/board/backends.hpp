@@ -7,6 +7,7 @@
 
 #include "core/geometry/vector.hpp"
 #include "core/memory/arena.hpp"
+#include "core/vehicle_model.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/planning/planner.hpp"
 
@@ -23,6 +24,7 @@ struct BackendNames {
 struct ImageLimits {
   std::uint16_t side_pixels{};  ///< The longer side of the largest image.
   double range_m{};             ///< The farthest that a camera sees.
+  double vehicle_radius_m{VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is.
 };
 
 struct MapAndPlanner {
