@@ -17,8 +17,6 @@ class StaticVector {
     return true;
   }
   void clear() noexcept { size_ = 0; }
-  /// Drops the elements from `count` on; a larger count changes nothing.
-  void truncate(std::size_t count) noexcept { size_ = count < size_ ? count : size_; }
 
   [[nodiscard]] static constexpr std::size_t capacity() noexcept { return N; }
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
