@@ -12,8 +12,8 @@ constexpr double kAtRest = 0.05;  // m/s and m/s2
 constexpr double kSameWaypoint_m = 0.25;
 constexpr double kMinSegment_s = 0.15;
 constexpr double kCruisePiece_m = 5.0;
-constexpr double kProfileShare =
-    0.60;  // of the acceleration limit: the curve around the profile needs the rest
+// Of the acceleration limit: the curve around the profile needs the rest.
+constexpr double kProfileShare = 0.60;
 constexpr double kCornerCut_m = 0.3;  // how far a corner may be cut: the planner leaves about so much room
 constexpr double kLimitTolerance = 1.05;
 constexpr int kSamples = 12;         // per segment, for the limits
