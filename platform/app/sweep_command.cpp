@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "core/record/state_hash.hpp"
+#include "platform/board/backends.hpp"
 #include "platform/evaluation/sweep_run.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
@@ -96,6 +97,9 @@ evaluation::SweepPlan plan_of(const SweepOptions& options, evaluation::SweepInpu
   set_shard(options.shard, plan);
   plan.map = options.map;
   plan.planner = options.planner;
+  if (board::uses_plugin({plan.map, plan.planner}))
+    throw InputError(
+        "--map, --planner: a sweep goes on later, when a plugin may be another: must be those that ship");
   if (!options.settings.empty()) {
     mission::load_settings(options.settings, inputs.base);
     plan.settings = evaluation::digest_of(input::read_text(options.settings, "a readable TOML file"));
