@@ -38,11 +38,11 @@ std::unique_ptr<stages::Planner> make_planner(const std::string& name, const Par
   std::unique_ptr<stages::Planner> planner;
   if (name.rfind("ompl:", 0) == 0) planner = stages::make_ompl_planner(name.substr(5), {});
   if (planner == nullptr) {
-    throw InputError(
-        fmt::format("unknown planner '{}': must be own, plugin:FILE.so or ompl:NAME, NAME one of OMPL's "
-                    "geometric planners (RRTstar, "
-                    "InformedRRTstar, BITstar, ABITstar, AITstar, RRTConnect, PRMstar, FMT, ...)",
-                    name));
+    throw InputError(fmt::format(
+        "unknown planner '{}': must be own or ompl:NAME, NAME one of OMPL's "
+        "geometric planners (RRTstar, "
+        "InformedRRTstar, BITstar, ABITstar, AITstar, RRTConnect, PRMstar, FMT, ...), or plugin:FILE.so",
+        name));
   }
   return planner;
 }

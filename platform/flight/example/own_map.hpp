@@ -1,6 +1,9 @@
 /// A map of your own: every cell of 0.3 m in one array, as large as the world. What was seen last counts.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+
 #include "platform/board/part_request.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "voxel_array.hpp"

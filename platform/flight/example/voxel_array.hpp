@@ -1,8 +1,6 @@
 /// Cells in one array, and what planner and smoother may ask of them.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "core/record/state_hash.hpp"
@@ -10,11 +8,7 @@
 
 namespace example {
 
-using roborun::Aabb;
-using roborun::kFinestCell_m;
-using roborun::Status;
-using roborun::Vector3;
-using roborun::stages::CellState;
+using roborun::Aabb, roborun::kFinestCell_m, roborun::Status, roborun::Vector3, roborun::stages::CellState;
 
 /// Unknown is not free, and what lies outside of the array or of the window is unknown.
 class VoxelArray final : public roborun::stages::MapView {
@@ -24,15 +18,14 @@ class VoxelArray final : public roborun::stages::MapView {
         size_(index_of(bounds_W.max_W) + 1),
         cell_(static_cast<std::size_t>(size_.prod()), CellState::kUnknown) {}
 
-  void set(const Vector3& p_W, CellState state) noexcept {
+  void set(const Vector3& p_W, CellState to) noexcept {
     const Index at = index_of(p_W);
     if (!holds(at)) return;
-    CellState& cell = cell_[flat(at)];
-    known_ += cell == CellState::kUnknown ? 1.0 : 0.0;
-    cell = state;
+    known_m3_ += state(at) == CellState::kUnknown ? kFinestCell_m * kFinestCell_m * kFinestCell_m : 0.0;
+    cell_[flat(at)] = to;
   }
   void show(const Aabb& window_W) noexcept { window_W_ = window_W; }
-  [[nodiscard]] double known_volume_m3() const noexcept { return known_ * kCell_m3; }
+  [[nodiscard]] double known_volume_m3() const noexcept { return known_m3_; }
   [[nodiscard]] std::size_t bytes() const noexcept { return cell_.size(); }
   [[nodiscard]] std::uint64_t digest() const noexcept {
     roborun::core::StateHash hash;
@@ -41,8 +34,8 @@ class VoxelArray final : public roborun::stages::MapView {
   }
 
   [[nodiscard]] bool is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
-    return window_W_.contains(box_W.min_W) && window_W_.contains(box_W.max_W) &&
-           is_free_at_finest(box_W, lookups);
+    const bool inside = window_W_.contains(box_W.min_W) && window_W_.contains(box_W.max_W);
+    return inside && is_free_at_finest(box_W, lookups);
   }
   [[nodiscard]] bool is_free_at_finest(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
     if (!(box_W.size().array() >= 0.0).all()) return false;  // NaN too
@@ -64,8 +57,6 @@ class VoxelArray final : public roborun::stages::MapView {
 
  private:
   using Index = Eigen::Array<long, 3, 1>;
-  static constexpr double kCell_m3 = kFinestCell_m * kFinestCell_m * kFinestCell_m;
-
   /// Clamped before it becomes an integer; outside stays outside.
   [[nodiscard]] Index index_of(const Vector3& p_W) const noexcept {
     return ((p_W - min_W_).array() / kFinestCell_m).floor().max(-1.0).min(1e6).cast<long>();
@@ -81,7 +72,7 @@ class VoxelArray final : public roborun::stages::MapView {
   Vector3 min_W_;
   Index size_;  ///< Before cell_, which is made from it.
   std::vector<CellState> cell_;
-  double known_{0.0};                                               ///< Cells.
+  double known_m3_{0.0};
   Aabb window_W_{Vector3::Constant(1.0), Vector3::Constant(-1.0)};  ///< Empty: nothing is exported yet.
 };
 
