@@ -25,6 +25,9 @@ fresh; echo '#include "stages/x.hpp"' >"$tree/governor/bad.hpp"; expect refuses 
 fresh; echo '#include "governor/x.hpp"' >"$tree/stages/bad.hpp"; expect refuses layers "stages include governor"
 fresh; echo '#include "core/x.hpp"' >"$tree/firmware_if/bad.hpp"; expect refuses layers "firmware_if includes core"
 fresh; echo '#include <unistd.h>' >"$tree/core/bad.hpp"; expect refuses layers "an OS header in core"
+fresh; mkdir -p "$tree/platform/flight/example"; echo '#include "platform/board/x.hpp"' >"$tree/platform/flight/example/good.hpp"
+expect passes layers "an example includes the simulator"
+echo '#include "platform/board/x.hpp"' >"$tree/platform/flight/bad.hpp"; expect refuses layers "the runtime includes a board"
 fresh; mkdir "$tree/extra"; expect refuses layers "another top-level folder"
 fresh; rm "$tree/core/clean.hpp"; expect refuses layers "nothing to check"; expect refuses words "nothing to check"
 for line in 'int* p = new int;' 'void* p = malloc(4);' 'std::vector<int> v;' 'throw 1;' 'std::mutex m;' 'auto t = steady_clock::now();' \
