@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "firmware_if/assert.hpp"
+
 namespace roborun::governor {
 namespace {
 
@@ -68,12 +70,14 @@ double least_over_segment_s(const TrajectoryOutlook& a, const TrajectoryOutlook&
 
 Nanos time_budget(double visible_m, double speed_mps, const StoppingModel& model,
                   const BudgetLimits& limits) noexcept {
+  ROBORUN_ASSERT(limits.validate() == Status::kOk);
   const double budget_s = raw_budget_s(visible_m, speed_mps, model, seconds(limits.longest));
   return std::clamp(from_seconds(budget_s), limits.shortest, limits.longest);
 }
 
 Nanos trajectory_budget(std::span<const TrajectoryOutlook> outlook, const StoppingModel& model,
                         const BudgetLimits& limits) noexcept {
+  ROBORUN_ASSERT(limits.validate() == Status::kOk);
   if (outlook.empty()) return limits.shortest;
   const double longest_s = seconds(limits.longest);
   double best_s = longest_s;

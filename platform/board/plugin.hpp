@@ -21,15 +21,15 @@
 
 #define ROBORUN_PLUGIN_ENTRY extern "C" __attribute__((visibility("default")))
 
-#define ROBORUN_PLUGIN_PLANNER(Class)                                  \
-  ROBORUN_PLUGIN_ENTRY roborun::stages::Planner* roborun_make_planner( \
-      const roborun::board::PartRequest* request) {                    \
-    return roborun::board::make_plugin_part<Class>(*request);          \
+#define ROBORUN_PLUGIN_PLANNER(Class)                                                  \
+  ROBORUN_PLUGIN_ENTRY roborun::stages::Planner* roborun_make_planner(                 \
+      const roborun::board::PartRequest* request, roborun::AssertionHandler handler) { \
+    return roborun::board::make_plugin_part<Class>(*request, handler);                 \
   }
-#define ROBORUN_PLUGIN_MAP(Class)                                       \
-  ROBORUN_PLUGIN_ENTRY roborun::stages::OccupancyMap* roborun_make_map( \
-      const roborun::board::PartRequest* request) {                     \
-    return roborun::board::make_plugin_part<Class>(*request);           \
+#define ROBORUN_PLUGIN_MAP(Class)                                                      \
+  ROBORUN_PLUGIN_ENTRY roborun::stages::OccupancyMap* roborun_make_map(                \
+      const roborun::board::PartRequest* request, roborun::AssertionHandler handler) { \
+    return roborun::board::make_plugin_part<Class>(*request, handler);                 \
   }
 
 ROBORUN_PLUGIN_ENTRY inline __attribute__((used)) const roborun::board::PluginAbi* roborun_plugin_abi() {
@@ -40,7 +40,8 @@ namespace roborun::board {
 
 /// Returns null for a class whose constructor throws.
 template <typename Class>
-[[nodiscard]] Class* make_plugin_part(const PartRequest& request) noexcept {
+[[nodiscard]] Class* make_plugin_part(const PartRequest& request, AssertionHandler handler) noexcept {
+  set_assertion_handler(handler);
   try {
     if constexpr (std::is_constructible_v<Class, const PartRequest&>) {
       return new Class(request);

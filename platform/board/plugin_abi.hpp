@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "firmware_if/assert.hpp"
 #include "platform/board/part_request.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/planning/planner.hpp"
@@ -54,10 +55,11 @@ struct PluginAbi {
 
 inline constexpr PluginAbi kProgramAbi{kPluginAbi, plugin_layout(), kPluginBuild};
 
-// The entries of a plugin, all extern "C". A part belongs to the caller, who deletes it.
+// The entries of a plugin, all extern "C". A part belongs to the caller, who deletes it; null: it could not be
+// made. A plugin has its own copy of all code, and so gets the program's way into the fail-safe.
 using PluginAbiEntry = const PluginAbi* (*)();
-using PluginPlannerEntry = stages::Planner* (*)(const PartRequest*);   ///< Null: it could not be made.
-using PluginMapEntry = stages::OccupancyMap* (*)(const PartRequest*);  ///< Null: it could not be made.
+using PluginPlannerEntry = stages::Planner* (*)(const PartRequest*, AssertionHandler);
+using PluginMapEntry = stages::OccupancyMap* (*)(const PartRequest*, AssertionHandler);
 inline constexpr const char* kPluginAbiEntry = "roborun_plugin_abi";
 inline constexpr const char* kPluginPlannerEntry = "roborun_make_planner";
 inline constexpr const char* kPluginMapEntry = "roborun_make_map";

@@ -56,7 +56,7 @@ std::unique_ptr<Part> load(const std::string& name, const char* symbol, const ch
                            const PartRequest& request) {
   const auto make = entry<Entry>(open(name), symbol);
   if (make == nullptr) refuse(name, fmt::format("holds no {}: has no {}()", what, symbol));
-  std::unique_ptr<Part> part(make(&request));
+  std::unique_ptr<Part> part(make(&request, detail::assertion_handler.load(std::memory_order_acquire)));
   if (part == nullptr) refuse(name, fmt::format("could not make its {} for this flight", what));
   return part;
 }

@@ -1,11 +1,9 @@
 #include "platform/flight/decision_program.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/geometry/camera_pose.hpp"
 #include "core/random/counter_rng.hpp"
-#include "core/record/state_hash.hpp"
 #include "platform/flight/landing_site.hpp"
 
 namespace roborun::flight {
@@ -20,24 +18,6 @@ constexpr Nanos kIdlePeriod{100'000'000};  // of reports while there is nothing 
 constexpr Nanos kLatestStop{20'000'000};   // 12 cm at 6 m/s
 
 }  // namespace
-
-bool DecisionProgram::is_usable(std::size_t camera, const firmware_if::DepthFrame& frame) noexcept {
-  constexpr int kEnough = 16;
-  core::StateHash hash;
-  std::size_t surfaces = 0;
-  std::size_t valid = 0;
-  for (const float depth_m : frame.depth_m) {
-    if (!(depth_m > 0.0F)) continue;
-    ++valid;
-    if (!std::isfinite(depth_m)) continue;
-    ++surfaces;
-    hash.add(static_cast<double>(depth_m));
-  }
-  // The open sky is the same in every image.
-  const bool stuck = surfaces >= kEnough && hash.value() == image_digest_[camera];
-  image_digest_[camera] = hash.value();
-  return !stuck && 5 * valid >= frame.depth_m.size();
-}
 
 void DecisionProgram::publish(MonotonicTime due) noexcept {
   report_.heard = true;
@@ -66,6 +46,32 @@ void DecisionProgram::judge() noexcept {
   refusals_before_ = refusals;
 }
 
+void DecisionProgram::look(const stages::PastStates& past, MonotonicTime now) noexcept {
+  std::array<std::size_t, kMostCameras> camera_of{};
+  frames_.clear();
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    stages::PosedDepthFrame posed;
+    Pose X_WB;
+    if (cameras_[i]->read(posed.frame) != Status::kOk || past.pose_at(posed.frame.stamp, X_WB) != Status::kOk)
+      continue;
+    posed.X_WC = core::camera_pose(X_WB, cameras_[i]->mount());
+    camera_of[frames_.size()] = i;
+    (void)frames_.push_back(posed);
+  }
+  // The same judge as in point cloud and map: what it refuses counts as not seen, for the failsafe too.
+  guard_.begin({frames_.begin(), frames_.size()});
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    if (guard_.check(frames_[i]) != Status::kOk) continue;
+    last_usable_[camera_of[i]] = frames_[i].frame.stamp;
+    frames_[kept++] = frames_[i];
+  }
+  frames_.truncate(kept);
+  report_.depth_age_s = 0.0;
+  for (std::size_t i = 0; i < cameras_.size(); ++i)
+    report_.depth_age_s = std::max(report_.depth_age_s, seconds(now - last_usable_[i]));
+}
+
 void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
   (void)mail_.report.take();
   const FlightReport& report = mail_.report.read();
@@ -77,19 +83,7 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
     lane.end_frame();
     return;
   }
-  frames_.clear();
-  report_.depth_age_s = 0.0;
-  for (std::size_t i = 0; i < cameras_.size(); ++i) {
-    stages::PosedDepthFrame posed;
-    Pose X_WB;
-    if (cameras_[i]->read(posed.frame) == Status::kOk && is_usable(i, posed.frame) &&
-        report.past.pose_at(posed.frame.stamp, X_WB) == Status::kOk) {
-      posed.X_WC = core::camera_pose(X_WB, cameras_[i]->mount());
-      (void)frames_.push_back(posed);
-      last_usable_[i] = posed.frame.stamp;
-    }
-    report_.depth_age_s = std::max(report_.depth_age_s, seconds(lane.release() - last_usable_[i]));
-  }
+  look(report.past, lane.release());
   publish(lane.release() + kIdlePeriod);
   if (frames_.empty()) {
     lane.set_period(4 * core::kMinorFrame);

@@ -42,9 +42,9 @@ class DecisionProgram final : public core::LaneProgram {
 
  private:
   void gather(core::LaneExecutive& lane) noexcept;
-  /// At least a fifth of its pixels says something, and not all the same as in the image before: a camera
-  /// without noise is stuck.
-  [[nodiscard]] bool is_usable(std::size_t camera, const firmware_if::DepthFrame& frame) noexcept;
+  /// Reads all cameras: frames_ are the images that may be used, and the depth's age is that of the camera
+  /// that is worst off.
+  void look(const stages::PastStates& past, MonotonicTime now) noexcept;
   void publish(MonotonicTime due) noexcept;
   void choose_site() noexcept;
   void judge() noexcept;
@@ -66,8 +66,8 @@ class DecisionProgram final : public core::LaneProgram {
   std::atomic<bool> given_up_{false};
   Trajectory handed_over_{};
   DecisionReport report_{};
+  stages::FrameGuard guard_{};
   std::array<MonotonicTime, kMostCameras> last_usable_{};  ///< By camera.
-  std::array<std::uint64_t, kMostCameras> image_digest_{};
   std::uint64_t refusals_before_{0};
 };
 

@@ -4,7 +4,9 @@
 #include <cstdint>
 
 #include "core/geometry/vector.hpp"
+#include "core/range.hpp"
 #include "core/trajectory.hpp"
+#include "firmware_if/assert.hpp"
 #include "firmware_if/motors.hpp"
 #include "firmware_if/status.hpp"
 #include "stages/control/estimator.hpp"
@@ -47,7 +49,10 @@ class Tracker {
     std::uint64_t steps{}, refused{}, tilt_limited{};
   };
 
-  explicit Tracker(const Config& config) noexcept : config_(config) {}
+  /// Precondition, asserted: config.validate() is kOk.
+  explicit Tracker(const Config& config) noexcept : config_(config) {
+    ROBORUN_ASSERT(config.validate() == Status::kOk);
+  }
 
   /// RT-safe: O(1). A non-finite input is refused with kInvalidArgument, counted, and `out` stays as it was:
   /// the caller repeats the command before, which for one frame is the safest known.

@@ -37,8 +37,8 @@ class BrickMap final : public OccupancyMap, private MapView {
     std::size_t max_frames{6};
     std::size_t max_image_side{512};  ///< Pixels. [8, 512]
     double vehicle_radius_m{0.6};     ///< Where the vehicle is, nothing else is: free. [0, 2]
-    double depth_margin_m{0.05};      ///< A cell is free only if every pixel sees this much past it ...
-    /// ... plus this times depth squared, in metres: three sigma of a stereo camera. 1/m, >= 0.
+    double depth_margin_m{0.05};  ///< A cell is free only if every pixel sees this much past it [0, 10] ...
+    /// ... plus this times depth squared, in metres: three sigma of a stereo camera. [0, 1]
     double depth_margin_quadratic_per_m{0.0012};
     /// kInvalidArgument if a number is out of range, or the bounds hold more than 4 million bricks.
     [[nodiscard]] Status validate() const noexcept;
@@ -50,7 +50,7 @@ class BrickMap final : public OccupancyMap, private MapView {
 
   /// Bytes that the constructor takes from the arena.
   [[nodiscard]] static std::size_t arena_bytes(const Config& config) noexcept;
-  /// Precondition: config.validate() is kOk and the arena has arena_bytes(). Check arena.exhausted()
+  /// Preconditions: config.validate() is kOk, asserted, and the arena has arena_bytes(). Check arena.exhausted()
   /// afterwards.
   BrickMap(const Config& config, core::Arena& arena) noexcept;
 

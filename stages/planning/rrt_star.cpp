@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/geometry/math.hpp"
+#include "firmware_if/assert.hpp"
 #include "stages/perception/polled_view.hpp"
 
 namespace roborun::stages {
@@ -65,7 +66,9 @@ RrtStar::RrtStar(const Config& config, core::Arena& arena) noexcept
       node_(arena.take<Node>(config.max_nodes, "planner nodes")),
       node_pool_(arena.last_pool()),
       visited_(arena.take<std::uint64_t>(kVisited, "planner visited cells")),
-      grid_(config.max_nodes, arena) {}
+      grid_(config.max_nodes, arena) {
+  ROBORUN_ASSERT(config.validate() == Status::kOk);
+}
 
 double RrtStar::promise_m(const Node& node, const Vector3& goal_W) const noexcept {
   return node.cost_m + kUnknownWeight * (goal_W - node.p_W).norm();

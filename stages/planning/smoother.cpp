@@ -56,9 +56,7 @@ void add_motion(const PolynomialSegment& segment, double at_s, double& speed2, d
 }
 
 bool is_well_posed(const SmoothRequest& request) noexcept {
-  const MotionLimits& limits = request.limits;
-  return is_finite(request.start) && limits.speed_mps > 0.0 && limits.speed_mps <= 30.0 &&
-         limits.acceleration_mps2 > 0.0 && limits.acceleration_mps2 <= 20.0 && request.radius_m > 0.0 &&
+  return is_finite(request.start) && request.limits.validate() == Status::kOk && request.radius_m > 0.0 &&
          request.start.v_W.norm() <= kMaxStart_mps;
 }
 

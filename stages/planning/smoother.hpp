@@ -8,6 +8,7 @@
 
 #include "core/executive/stage_budget.hpp"
 #include "core/memory/static_vector.hpp"
+#include "core/range.hpp"
 #include "core/trajectory.hpp"
 #include "firmware_if/status.hpp"
 #include "stages/perception/polled_view.hpp"
@@ -18,6 +19,10 @@ namespace roborun::stages {
 struct MotionLimits {
   double speed_mps{6.0};          ///< (0, 30]
   double acceleration_mps2{4.0};  ///< (0, 20]. |a| along the whole trajectory, braking included.
+  [[nodiscard]] constexpr Status validate() const noexcept {
+    const bool ok = core::above(speed_mps, 0.0, 30.0) && core::above(acceleration_mps2, 0.0, 20.0);
+    return ok ? Status::kOk : Status::kInvalidArgument;
+  }
 };
 
 struct SmoothRequest {

@@ -18,7 +18,7 @@ target_link_libraries(roborun_flags INTERFACE Eigen3::Eigen)
 # What is ours alone: directory options reach every target of this tree and no other. Errors only where we are at home: the
 # next compiler warns of more.
 add_compile_options(
-  -fstack-protector-strong
+  -fstack-protector-strong -fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=  # no path of this machine in assertions
   -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wdouble-promotion
   -Wold-style-cast -Wcast-align -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Wvla)
 if(PROJECT_IS_TOP_LEVEL)

@@ -12,6 +12,7 @@
 
 #include "core/precision.hpp"
 #include "core/record/state_hash.hpp"
+#include "firmware_if/assert.hpp"
 #include "stages/perception/depth_steps.hpp"
 #include "stages/perception/frame_guard.hpp"
 
@@ -366,6 +367,7 @@ class OctomapBackend final : public OccupancyMap, private MapView {
 }  // namespace
 
 std::unique_ptr<OccupancyMap> make_octomap_backend(const OctomapConfig& config) noexcept {
+  ROBORUN_ASSERT(config.validate() == Status::kOk);
   try {
     return std::make_unique<OctomapBackend>(config);
   } catch (...) {

@@ -88,12 +88,5 @@ TEST(Tracker, AllocatesNothing) {
   EXPECT_EQ(scope.count(), 0U);
 }
 
-TEST(Tracker, ConfigValidates) {
-  EXPECT_EQ(Tracker::Config{}.validate(), Status::kOk);
-  Tracker::Config config;
-  config.rate_gain_Hz = 0.0;
-  EXPECT_EQ(config.validate(), Status::kInvalidArgument);
-}
-
 }  // namespace
 }  // namespace roborun::stages
