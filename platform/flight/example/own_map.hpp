@@ -9,6 +9,7 @@
 #include "voxel_array.hpp"
 
 namespace example {
+using roborun::Status;
 
 /// Keeps the contract of stages::OccupancyMap (stages/perception/occupancy_map.hpp).
 class VoxelMap final : public roborun::stages::OccupancyMap {

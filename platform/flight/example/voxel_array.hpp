@@ -8,7 +8,7 @@
 
 namespace example {
 
-using roborun::Aabb, roborun::kFinestCell_m, roborun::Status, roborun::Vector3, roborun::stages::CellState;
+using roborun::Aabb, roborun::kFinestCell_m, roborun::Vector3, roborun::stages::CellState;
 
 /// Unknown is not free, and what lies outside of the array or of the window is unknown.
 class VoxelArray final : public roborun::stages::MapView {
