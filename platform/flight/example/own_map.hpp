@@ -57,13 +57,13 @@ class VoxelMap final : public roborun::stages::OccupancyMap {
       if (!(depth_m > 0.0)) continue;  // NaN too: no information
       // firmware_if/depth_camera.hpp: x along the optical axis, y left, z up.
       const double t = static_cast<double>(image.tan_half_fov_ratio);
-      const double u = (static_cast<double>(i % image.width) + 0.5) / image.width;
-      const double v = (static_cast<double>(i / image.width) + 0.5) / image.height;
+      const std::size_t row = i / image.width, column = i % image.width;
+      const double u = (static_cast<double>(column) + 0.5) / image.width;
+      const double v = (static_cast<double>(row) + 0.5) / image.height;
       const Vector3 ray_W = posed.X_WC.R_RT * Vector3(1.0, t - 2.0 * t * u, t - 2.0 * t * v);
       const double end_m = std::min(static_cast<double>(image.range_m), reach_m / ray_W.norm());
       if (state == CellState::kOccupied) {
         if (depth_m <= end_m) cells_.set(posed.X_WC.p_RT + depth_m * ray_W, state);
-        ++work.units;
         continue;
       }
       const double step_m = 0.5 * roborun::kFinestCell_m / ray_W.norm();
