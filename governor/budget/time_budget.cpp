@@ -18,11 +18,13 @@ double raw_budget_s(double visible_m, double speed_mps, const StoppingModel& mod
   return 0.0;
 }
 
-/// Least s + max(b(s), 0) over one segment, speed and visibility linear in u = s - begin. With d_stop = q v^2
-/// + l v
-/// + c the derivative is (1 - q v') + (d' v - v' (d - c)) / v^2, whose second numerator does not depend on u:
-/// one stationary speed. Where the rest d - d_stop crosses zero, b ends; below the speed where d_stop is
-/// clamped to zero, the same holds with q = l = c = 0.
+/// Least s + max(b(s), 0) over one segment, speed v and visibility d linear in u = s - begin. With
+///   d_stop = q v^2 + l v + c     b = (d - d_stop) / v = (d - c) / v - q v - l
+/// the derivative of u + b is
+///   (1 - q v') + (d' v - v' (d - c)) / v^2
+/// The second numerator does not depend on u (its own derivative is d' v' - v' d' = 0), so there is one
+/// stationary speed. Where the rest d - d_stop crosses zero, b ends; below the speed where d_stop is clamped
+/// to zero, the same holds with q = l = c = 0.
 double least_over_segment_s(const TrajectoryOutlook& a, const TrajectoryOutlook& b,
                             const StoppingModel& model, double longest_s) noexcept {
   const double duration_s = b.time_s - a.time_s;

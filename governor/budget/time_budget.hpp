@@ -6,7 +6,7 @@
 #include "core/space_profile.hpp"
 #include "firmware_if/status.hpp"
 #include "firmware_if/time.hpp"
-#include "governor/models/stopping_model.hpp"
+#include "core/stopping_model.hpp"
 
 namespace roborun::governor {
 
@@ -28,7 +28,7 @@ struct BudgetLimits {
 /// Algorithm 1, exact. With b(s) = Eq. 1 at the point of the trajectory that is reached after s (speed and
 /// visibility linear between the samples, the last one held), the algorithm's running minimum has the closed
 /// form
-///     budget = min over s >= 0 of (s + max(b(s), 0)):
+///     budget = min over s >= 0 of (s + max(b(s), 0))
 /// at no earlier instant of following the trajectory does the remaining budget run out. Whole segments are
 /// not needed, and nothing is lost after the last way-point. Within a segment the minimum is at one of at
 /// most nine points in closed form. No sample: Eq. 1 is for the caller; gives the shortest.

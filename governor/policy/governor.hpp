@@ -8,6 +8,7 @@
 #include "core/executive/cost_profile.hpp"
 #include "core/operating_point.hpp"
 #include "core/space_profile.hpp"
+#include "core/vehicle_model.hpp"
 #include "governor/budget/time_budget.hpp"
 #include "governor/models/latency_model.hpp"
 #include "governor/policy/decision_policy.hpp"
@@ -59,8 +60,8 @@ struct GovernorConfig {
   double point_cloud_s{};  ///< Fixed costs of the other stages. Each [0, 1e6].
   double governor_s{};     ///< 0 for the static designs: they have none.
   double smoother_s{};
-  double v_max_mps{6.0};        ///< RoboRun Table "Knob values"; the static design's is 0.5. (0, 30]
-  double vehicle_width_m{1.2};  ///< (0, 20]
+  double v_max_mps{VehicleModel{}.speed_mps};        ///< RoboRun Table "Knob values"; the static design's is 0.5. (0, 30]
+  double vehicle_width_m{2.0 * VehicleModel{}.radius_m};  ///< (0, 20]
   /// The most that the cameras can see between the height limits. (0, 1e9]
   double sensor_volume_max_m3{60e3};
   int coarsest_level{3};  ///< Cells must fit several times into the flight band. [0, kPrecisionLevels)

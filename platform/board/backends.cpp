@@ -16,6 +16,7 @@ stages::BrickMap::Config brick_config(const Aabb& map_bounds_W, const ImageLimit
   stages::BrickMap::Config config;
   config.bounds_W = map_bounds_W;
   config.max_image_side = images.side_pixels;
+  config.vehicle_radius_m = images.vehicle_radius_m;
   if (config.validate() != Status::kOk) {
     throw InputError("map: the world is too large for the map: at most 4 million bricks of 4.8 m");
   }
@@ -26,7 +27,8 @@ std::unique_ptr<stages::OccupancyMap> make_map(const std::string& name, const Pa
                                                core::Arena& arena) {
   const auto& [bounds_W, images] = request;
   if (name == "own") return std::make_unique<stages::BrickMap>(brick_config(bounds_W, images), arena);
-  if (name == "octomap") return stages::make_octomap_backend({bounds_W, images.range_m + 5.0});
+  if (name == "octomap")
+    return stages::make_octomap_backend({bounds_W, images.vehicle_radius_m, images.range_m + 5.0});
   if (is_plugin(name)) return load_map(name, request);
   throw InputError(fmt::format("unknown map '{}': must be own or octomap, or plugin:FILE.so", name));
 }

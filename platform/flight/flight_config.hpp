@@ -36,7 +36,5 @@ struct FlightConfig {
 
 /// What the map has to hold: the flight's bounds and a margin in which surfaces are of interest.
 [[nodiscard]] Aabb map_bounds_W(const FlightConfig& config) noexcept;
-/// Distance that plans keep from everything: the vehicle's radius and its tracking error.
-[[nodiscard]] double planned_radius_m(const FlightConfig& config) noexcept;
 
 }  // namespace roborun::flight

@@ -145,6 +145,7 @@ RecordedFlight recorded_flight_from(std::span<const std::byte> json) {
   recorded.images.side_pixels = static_cast<std::uint16_t>(number(j, "pixels", 8, 512));
   recorded.images.range_m = number(j, "range_m", 1, 200);
   flight.camera_range_m = recorded.images.range_m;
+  recorded.images.vehicle_radius_m = flight.vehicle.radius_m;
   recorded.slow_down = {number(j, "slow_down_at_s", 0, 1e300), number(j, "slow_down_factor", 0.001, 1000)};
   flight.answers = j.at("answers").get<bool>();
   flight.fence = read_fence(j.at("fence"));

@@ -18,6 +18,7 @@
 #include <span>
 
 #include "core/memory/arena.hpp"
+#include "core/vehicle_model.hpp"
 #include "stages/perception/block_sight.hpp"
 #include "stages/perception/brick.hpp"
 #include "stages/perception/depth_pyramid.hpp"
@@ -36,7 +37,7 @@ class BrickMap final : public OccupancyMap, private MapView {
     /// Cameras. Space between two images counts as seen only if all arrived. [1, 8]
     std::size_t max_frames{6};
     std::size_t max_image_side{512};  ///< Pixels. [8, 512]
-    double vehicle_radius_m{0.6};     ///< Where the vehicle is, nothing else is: free. [0, 2]
+    double vehicle_radius_m{VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is: free. [0, 2]
     double depth_margin_m{0.05};  ///< A cell is free only if every pixel sees this much past it [0, 10] ...
     /// ... plus this times depth squared, in metres: three sigma of a stereo camera. [0, 1]
     double depth_margin_quadratic_per_m{0.0012};

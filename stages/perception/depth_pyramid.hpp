@@ -23,7 +23,6 @@ namespace roborun::stages {
 class DepthPyramid {
  public:
   static constexpr int kMaxLevels = 11;
-  static constexpr std::size_t kMaxPixels = kMaxImageSide;
   static constexpr std::int32_t kMaxSteps = DepthEntry::kMaxSteps;
 
   using Entry = DepthEntry;

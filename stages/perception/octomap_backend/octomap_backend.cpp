@@ -154,14 +154,14 @@ class OctomapBackend final : public OccupancyMap, private MapView {
   }
 
   /// Where the vehicle is, nothing else is: the cells that no ray can tell.
-  static void free_vehicle(octomap::OcTree& tree, const Vector3& p_WB) {
+  void free_vehicle(octomap::OcTree& tree, const Vector3& p_WB) const {
     const double cell_m = tree.getResolution();
-    const int n = std::max(1, static_cast<int>(std::ceil(1.0 / cell_m)));
+    const int n = std::max(1, static_cast<int>(std::ceil((config_.vehicle_radius_m + 0.4) / cell_m)));
     for (int dz = -n; dz <= n; ++dz) {
       for (int dy = -n; dy <= n; ++dy) {
         for (int dx = -n; dx <= n; ++dx) {
           const Vector3 offset = cell_m * Vector3(dx, dy, dz);
-          if (offset.norm() > std::max(0.6, 0.5 * cell_m)) continue;
+          if (offset.norm() > std::max(config_.vehicle_radius_m, 0.5 * cell_m)) continue;
           const octomap::point3d p = to_octomap(p_WB + offset);
           if (tree.search(p) == nullptr) tree.updateNode(p, false);
         }

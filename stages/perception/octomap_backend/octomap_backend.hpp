@@ -6,12 +6,14 @@
 
 #include "core/geometry/vector.hpp"
 #include "core/range.hpp"
+#include "core/vehicle_model.hpp"
 #include "stages/perception/occupancy_map.hpp"
 
 namespace roborun::stages {
 
 struct OctomapConfig {
   Aabb bounds_W{};            ///< Space outside is never stored: unknown.
+  double vehicle_radius_m{VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is.
   double view_reach_m{30.0};  ///< Half the side of the exported window. (0, 1000]
   [[nodiscard]] Status validate() const noexcept {
     const bool ok = is_finite(bounds_W.min_W) && is_finite(bounds_W.max_W) &&

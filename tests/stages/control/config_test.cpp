@@ -10,18 +10,18 @@ namespace {
 TEST(TrackerConfigDeathTest, OnlyValidOnesAreMade) {
   using Config = Tracker::Config;
   test::expect_only_valid_configs<Config>({}, [](const Config& config) { const Tracker sut(config); },
-                                          {{"mass", [](Config& c) { c.airframe.mass_kg = 0.0; }},
-                                           {"inertia", [](Config& c) { c.airframe.inertia_kgm2.y() = 0.0; }},
-                                           {"arm", [](Config& c) { c.airframe.arm_m = -0.3; }},
-                                           {"thrust", [](Config& c) { c.airframe.max_thrust_N = 0.0; }},
-                                           {"yaw torque", [](Config& c) { c.airframe.yaw_torque_m = 0.0; }},
+                                          {{"mass", [](Config& c) { c.vehicle.mass_kg = 0.0; }},
+                                           {"inertia", [](Config& c) { c.vehicle.inertia_y_kgm2 = 0.0; }},
+                                           {"arm", [](Config& c) { c.vehicle.arm_m = -0.3; }},
+                                           {"thrust", [](Config& c) { c.vehicle.max_thrust_N = 0.0; }},
+                                           {"yaw torque", [](Config& c) { c.vehicle.yaw_torque_m = 0.0; }},
                                            {"position gain", [](Config& c) { c.position_gain_Hz = 10.1; }},
                                            {"velocity gain", [](Config& c) { c.velocity_gain_Hz = 0.0; }},
                                            {"integral", [](Config& c) { c.velocity_integral_Hz2 = -0.1; }},
                                            {"integral limit", [](Config& c) { c.integral_limit_mps2 = 0.0; }},
                                            {"attitude gain", [](Config& c) { c.attitude_gain_Hz = 51.0; }},
                                            {"rate gain", [](Config& c) { c.rate_gain_Hz = 0.0; }},
-                                           {"tilt", [](Config& c) { c.tilt_limit_rad = 1.3; }},
+                                           {"tilt", [](Config& c) { c.vehicle.tilt_rad = 1.3; }},
                                            {"correction", [](Config& c) { c.correction_limit_mps = 0.0; }},
                                            {"period", [](Config& c) { c.period_s = 0.0; }}});
 }

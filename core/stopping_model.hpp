@@ -4,7 +4,7 @@
 #include "core/range.hpp"
 #include "firmware_if/status.hpp"
 
-namespace roborun::governor {
+namespace roborun {
 
 /// d_stop(v) = quadratic v^2 + linear v + constant, at least 0.
 struct StoppingModel {
@@ -31,4 +31,4 @@ inline constexpr StoppingModel kRoborunStopping{0.05494, 0.3549, -0.2038};
 /// 3.772, 5.284 m (tests/platform/sitl/vehicle/stopping_test.cpp).
 inline constexpr StoppingModel kSitlQuadrotorStopping{0.262, 0.03, 0.15};
 
-}  // namespace roborun::governor
+}  // namespace roborun
