@@ -43,7 +43,8 @@ const char* cannot_fly(const VehicleModel& v, double visible_m) noexcept {
   // Not as slowly as the slowest useful flight: as fast as its limit says is a question of the world.
   constexpr double kSlow_mps = 0.5;
   if (stopping_model(v).distance_m(kSlow_mps) + planned_radius_m(v) >= visible_m)
-    return "cannot stop within what it sees: at 0.5 m/s its stop and its radius must be below the shortest range";
+    return "cannot stop within what it sees: at 0.5 m/s its stop and its radius must be below the shortest "
+           "range";
   return nullptr;
 }
 

@@ -4,9 +4,9 @@
 #include <span>
 
 #include "core/space_profile.hpp"
+#include "core/stopping_model.hpp"
 #include "firmware_if/status.hpp"
 #include "firmware_if/time.hpp"
-#include "core/stopping_model.hpp"
 
 namespace roborun::governor {
 

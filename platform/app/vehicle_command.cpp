@@ -64,10 +64,11 @@ std::vector<std::string> shortcomings_of(const vehicle::Vehicle& vehicle, const 
   std::vector<std::string> lines;
   const VehicleModel& v = vehicle.model;
   if (c.fastest_mps < v.speed_mps)
-    lines.push_back(fmt::format("cannot use its {:.1f} m/s: what it sees allows {:.1f} m/s", v.speed_mps,
-                                c.fastest_mps));
+    lines.push_back(
+        fmt::format("cannot use its {:.1f} m/s: what it sees allows {:.1f} m/s", v.speed_mps, c.fastest_mps));
   if (c.thrust_to_weight_ratio < 1.6)
-    lines.push_back(fmt::format("has little thrust for wind: thrust-to-weight {:.2f}", c.thrust_to_weight_ratio));
+    lines.push_back(
+        fmt::format("has little thrust for wind: thrust-to-weight {:.2f}", c.thrust_to_weight_ratio));
   lines.push_back(fmt::format("cannot pass gaps narrower than {:.2f} m", c.gap_m));
   return lines;
 }
@@ -100,7 +101,8 @@ int check(const VehicleOptions& options) {
              vehicle.model.tilt_rad * 180.0 / core::kPi);
   fmt::print("stops within        ");
   for (const auto& [speed_mps, distance_m] : c.stop)
-    fmt::print(" {:.2f} m from {:.1f} m/s{}", distance_m, speed_mps, speed_mps < vehicle.model.speed_mps ? "," : "\n");
+    fmt::print(" {:.2f} m from {:.1f} m/s{}", distance_m, speed_mps,
+               speed_mps < vehicle.model.speed_mps ? "," : "\n");
   fmt::print("sees                 {:.0f} m: enough for {:.1f} m/s, when it thinks for 0.2 s\n", c.range_m,
              c.fastest_mps);
   fmt::print("memory               {:.1f} MiB in a world of 100 x 100 x 10 m\n",
@@ -126,7 +128,8 @@ int list(const VehicleOptions& options) {
 
 void add_vehicle_command(CLI::App& app, std::function<int()>& run) {
   const auto options = std::make_shared<VehicleOptions>();
-  CLI::App* command = app.add_subcommand("vehicle", "Vehicles: which ship, and what follows from a vehicle file");
+  CLI::App* command =
+      app.add_subcommand("vehicle", "Vehicles: which ship, and what follows from a vehicle file");
   command->footer(
       "Examples:\n"
       "  roborun vehicle list\n"
@@ -141,7 +144,8 @@ void add_vehicle_command(CLI::App& app, std::function<int()>& run) {
   list_app->callback([options, &run] { run = [options] { return list(*options); }; });
   CLI::App* check_app = command->add_subcommand(
       "check", "Stopping distances, thrust, what it sees, memory, and what it cannot do");
-  check_app->add_option("FILE", options->file, "A vehicle file, or the name of a shipped vehicle")->required();
+  check_app->add_option("FILE", options->file, "A vehicle file, or the name of a shipped vehicle")
+      ->required();
   check_app->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
   check_app->callback([options, &run] { run = [options] { return check(*options); }; });
 }

@@ -30,12 +30,12 @@ double arrival_s(const Trajectory& trajectory, const DecisionInput& in) noexcept
 }  // namespace
 
 DecisionPipeline::DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter,
-                                   governor::Governor& governor, stages::PointCloud& cloud,
+                                   governor::DecisionPolicy& policy, stages::PointCloud& cloud,
                                    stages::OccupancyMap& map, stages::Planner& planner,
                                    stages::Smoother& smoother) noexcept
     : config_(config),
       meter_(meter),
-      governor_(governor),
+      policy_(policy),
       cloud_(cloud),
       map_(map),
       planner_(planner),
@@ -72,8 +72,9 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
                         config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
   motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W}, cloud_.points(), map_.view(), budget, work);
   out.motion = motion_.moving(in.now);
-  (void)profile_space({.vehicle_width_m = 2.0 * config_.vehicle.radius_m}, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W,
-                      relevant_W, r_m, out.profile, budget, work);
+  (void)profile_space({.vehicle_width_m = 2.0 * config_.vehicle.radius_m}, cloud_.points(), map_.view(),
+                      *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W, relevant_W, r_m, out.profile,
+                      budget, work);
   if (!sees_all) out.profile.obstacle_ahead_m = 0.0;
   out.profile.sensor_volume_m3 = cloud_.seen_volume_m3();
   // What the map will hold once this decision's images are in it.
@@ -89,7 +90,7 @@ bool DecisionPipeline::went_straight(const DecisionInput& in) const noexcept {
 }
 
 void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noexcept {
-  out.decision = governor_.decide(
+  out.decision = policy_.decide(
       out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing, out.motion, went_straight(in)});
   if (out.decision.predicted_s[index(core::StageId::kGovernor)] > 0.0)
     charge(core::StageId::kGovernor, {}, out);
@@ -141,8 +142,7 @@ std::optional<Trajectory> DecisionPipeline::stop_before(const DecisionInput& in,
   const TrajectoryPoint then = in.committed->at(soonest);
   Trajectory stop;
   if (then.v_W.norm() <= kAtRest_mps ||
-      smoother_.brake(then, soonest, limits(config_.vehicle.acceleration_mps2), stop) !=
-          Status::kOk)
+      smoother_.brake(then, soonest, limits(config_.vehicle.acceleration_mps2), stop) != Status::kOk)
     return std::nullopt;
   const double stop_free_s = free_until_s(known, stop, 0.0, config_.vehicle.radius_m, work.units);
   if (!std::isinf(stop_free_s) && soonest + from_seconds(stop_free_s) < free_until) return std::nullopt;
@@ -230,7 +230,7 @@ void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noex
     const auto stage = static_cast<core::StageId>(i);
     // The straight way alone is a few cells: too little to tell how fast the processor is.
     if (stage == core::StageId::kPlanner && out.decision.open) continue;
-    governor_.observe(stage, out.decision.predicted_s[i], seconds(out.cost[i]));
+    policy_.observe(stage, out.decision.predicted_s[i], seconds(out.cost[i]));
   }
   failures_ = out.smoother_status == Status::kOk || in.climbing ? 0 : failures_ + 1;
 }

@@ -13,7 +13,7 @@
 #include "core/geometry/vector.hpp"
 #include "core/trajectory.hpp"
 #include "core/vehicle_model.hpp"
-#include "governor/policy/governor.hpp"
+#include "governor/policy/decision_policy.hpp"
 #include "platform/flight/motion_watch.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/perception/point_cloud.hpp"
@@ -24,11 +24,11 @@
 namespace roborun::flight {
 
 struct PipelineConfig {
-  Aabb flight_bounds_W{};        ///< The vehicle's centre stays inside.
+  Aabb flight_bounds_W{};  ///< The vehicle's centre stays inside.
   VehicleModel vehicle{};
   std::size_t cameras{6};  ///< What fewer images do not show may be anything.
   double horizon_m{24.0};  ///< No way-point farther than this: one metre less than the cameras see.
-  core::Fence fence{};                   ///< What it forbids is occupied for planner and smoother.
+  core::Fence fence{};     ///< What it forbids is occupied for planner and smoother.
   Nanos minor_frame{core::kMinorFrame};  ///< Of the flight lane: no stop takes over sooner.
   Aabb map_bounds_W{};  ///< What the map stores; its heights limit what counts as seen volume.
 };
@@ -71,8 +71,8 @@ struct DecisionOutput {
 /// Memory: everything is taken from the arena at construction. One thread.
 class DecisionPipeline {
  public:
-  /// The map and the planner are given from outside, so that any backend flies with any design.
-  DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter, governor::Governor& governor,
+  /// Policy, map and planner are given from outside, so that any backend flies with any design.
+  DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter, governor::DecisionPolicy& policy,
                    stages::PointCloud& cloud, stages::OccupancyMap& map, stages::Planner& planner,
                    stages::Smoother& smoother) noexcept;
 
@@ -133,7 +133,7 @@ class DecisionPipeline {
 
   PipelineConfig config_;
   core::StageMeter& meter_;
-  governor::Governor& governor_;
+  governor::DecisionPolicy& policy_;
   stages::PointCloud& cloud_;
   stages::OccupancyMap& map_;
   stages::Planner& planner_;

@@ -17,11 +17,11 @@ struct FailsafeMeasures {
   double esc_silence_s{};   ///< Of the ESC that is worst off.
   double link_silence_s{};  ///< Since the operator was last heard.
   double tracking_error_ratio{};  ///< Distance from the reference over what plans keep free.
-  double planner_failures{};  ///< Decisions in a row without a usable answer.
-  double decision_late_s{};   ///< After the instant when the decision lane wanted to be back.
-  double map_refusals{};      ///< Decisions in a row in which the map refused new bricks.
-  double control_lost{};      ///< 1: no or stuck IMU samples, or tilted by far more than the limit.
-  double killed{};            ///< 1: the kill switch has killed.
+  double planner_failures{};      ///< Decisions in a row without a usable answer.
+  double decision_late_s{};       ///< After the instant when the decision lane wanted to be back.
+  double map_refusals{};          ///< Decisions in a row in which the map refused new bricks.
+  double control_lost{};          ///< 1: no or stuck IMU samples, or tilted by far more than the limit.
+  double killed{};                ///< 1: the kill switch has killed.
 };
 
 struct FailsafeThreshold {

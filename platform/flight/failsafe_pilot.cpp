@@ -11,8 +11,8 @@ using governor::Phase;
 
 namespace {
 
-constexpr double kLostTilt_rad = 1.0472;   // 60 degrees ...
-constexpr double kBeyondLimit_rad = 0.3;   // ... or so much more than the controller ever asks for
+constexpr double kLostTilt_rad = 1.0472;  // 60 degrees ...
+constexpr double kBeyondLimit_rad = 0.3;  // ... or so much more than the controller ever asks for
 constexpr double kHome_m = 1.0;
 constexpr double kAtSite_m = 0.7;
 constexpr double kDescent_mps = 1.0;
@@ -47,7 +47,7 @@ FailsafeMeasures FailsafePilot::measure(MonotonicTime now, const DecisionReport&
   if (control_.estimator().state(state) != Status::kOk) return m;
   const bool tilted = state.q_WB.toRotationMatrix()(2, 2) < lost_tilt_cos_;
   m.control_lost = tilted || control_.imu_lost(now) ? 1.0 : 0.0;
-  if (control_.flying()) 
+  if (control_.flying())
     m.tracking_error_ratio =
         (state.p_WB - control_.reference().p_W).norm() / planned_radius_m(config_.vehicle);
   // Heights only between climb and descent: both go through the floor.

@@ -12,7 +12,7 @@ constexpr Nanos kSettle{1'000'000'000};     // the filter's biases need a second
 constexpr Nanos kHover{300'000'000};        // at the top, before the first decision
 constexpr double kGyroRange_radps = 35.0;   // 2,000 degrees a second
 constexpr double kAccelRange_mps2 = 157.0;  // 16 g
-constexpr double kBrakeShare = 0.625;       // of the limit of acceleration: besides what the path itself needs
+constexpr double kBrakeShare = 0.625;  // of the limit of acceleration: besides what the path itself needs
 constexpr double kTakeOff_mps = 1.5;
 constexpr double kStand_m = 0.5;
 constexpr double kStand_mps = 0.3;

@@ -83,8 +83,9 @@ std::array<const char*, N> names_of() {
 
 void ScenarioReader::read_head(Scenario& s) const {
   const toml::table& head = table("scenario");
-  reader_.allow_keys(head, "[scenario]",
-                     {"about", "world", "environment", "vehicle", "seed", "design", "answers", "cost_factor"});
+  reader_.allow_keys(
+      head, "[scenario]",
+      {"about", "world", "environment", "vehicle", "seed", "design", "answers", "cost_factor"});
   s.about = text(reader_.need(head, "about", "[scenario]"), "about");
   const toml::node* world = head.get("world");
   const toml::node* environment = head.get("environment");

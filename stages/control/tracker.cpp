@@ -84,9 +84,8 @@ Status Tracker::step(const Input& in, firmware_if::MotorCommand& out) noexcept {
   const Vector3 rate_B = feed_B - config_.attitude_gain_Hz * error_B.cwiseProduct(Vector3(1.0, 1.0, 0.4));
 
   const Vector3 momentum = inertia_kgm2.cwiseProduct(in.state.w_WB_B);
-  const Vector3 torque_B =
-      config_.rate_gain_Hz * inertia_kgm2.cwiseProduct(rate_B - in.state.w_WB_B) +
-      in.state.w_WB_B.cross(momentum);
+  const Vector3 torque_B = config_.rate_gain_Hz * inertia_kgm2.cwiseProduct(rate_B - in.state.w_WB_B) +
+                           in.state.w_WB_B.cross(momentum);
   const double thrust_N = vehicle.mass_kg * std::max(force_W.dot(R_WB.col(2)), 0.0);
   out = mix(vehicle, thrust_N, torque_B);
   return Status::kOk;

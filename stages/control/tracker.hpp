@@ -30,12 +30,12 @@ class Tracker {
     double correction_limit_mps{3.0};   ///< Of the position loop. (0, 20]
     double period_s{0.0025};            ///< The minor frame. (0, 0.1]
     [[nodiscard]] Status validate() const noexcept {
-      const bool ok =
-          out_of_bounds(vehicle) == nullptr && core::above(position_gain_Hz, 0.0, 10.0) &&
-          core::above(velocity_gain_Hz, 0.0, 20.0) && core::within(velocity_integral_Hz2, 0.0, 20.0) &&
-          core::above(integral_limit_mps2, 0.0, 10.0) && core::above(attitude_gain_Hz, 0.0, 50.0) &&
-          core::above(rate_gain_Hz, 0.0, 100.0) &&
-          core::above(correction_limit_mps, 0.0, 20.0) && core::above(period_s, 0.0, 0.1);
+      const bool ok = out_of_bounds(vehicle) == nullptr && core::above(position_gain_Hz, 0.0, 10.0) &&
+                      core::above(velocity_gain_Hz, 0.0, 20.0) &&
+                      core::within(velocity_integral_Hz2, 0.0, 20.0) &&
+                      core::above(integral_limit_mps2, 0.0, 10.0) &&
+                      core::above(attitude_gain_Hz, 0.0, 50.0) && core::above(rate_gain_Hz, 0.0, 100.0) &&
+                      core::above(correction_limit_mps, 0.0, 20.0) && core::above(period_s, 0.0, 0.1);
       return ok ? Status::kOk : Status::kInvalidArgument;
     }
   };

@@ -37,8 +37,9 @@ class BrickMap final : public OccupancyMap, private MapView {
     /// Cameras. Space between two images counts as seen only if all arrived. [1, 8]
     std::size_t max_frames{6};
     std::size_t max_image_side{512};  ///< Pixels. [8, 512]
-    double vehicle_radius_m{VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is: free. [0, 2]
-    double depth_margin_m{0.05};  ///< A cell is free only if every pixel sees this much past it [0, 10] ...
+    double vehicle_radius_m{
+        VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is: free. [0, 2]
+    double depth_margin_m{0.05};   ///< A cell is free only if every pixel sees this much past it [0, 10] ...
     /// ... plus this times depth squared, in metres: three sigma of a stereo camera. [0, 1]
     double depth_margin_quadratic_per_m{0.0012};
     /// kInvalidArgument if a number is out of range, or the bounds hold more than 4 million bricks.

@@ -16,8 +16,8 @@ namespace roborun::stages {
 
 struct SpaceProfilerConfig {
   double vehicle_width_m{2.0 * VehicleModel{}.radius_m};  ///< A gap narrower than this is no gap. (0, 20]
-  double widest_gap_m{20.0};    ///< A gap wider than this does not ask for precision. (vehicle width, 1000]
-  double gap_reach_m{15.0};     ///< Obstacles farther than this belong to a later decision. (0, 1000]
+  double widest_gap_m{20.0};  ///< A gap wider than this does not ask for precision. (vehicle width, 1000]
+  double gap_reach_m{15.0};   ///< Obstacles farther than this belong to a later decision. (0, 1000]
   /// Points this much above or below the vehicle can stand in its way. (0, 100]
   double height_band_m{1.5};
   /// Spacing of the samples along the trajectory (doubled until they fit). [0.001, 60]

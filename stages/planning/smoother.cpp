@@ -16,7 +16,7 @@ constexpr double kCruisePiece_m = 5.0;
 constexpr double kProfileShare = 0.60;
 constexpr double kCornerCut_m = 0.3;  // how far a corner may be cut: the planner leaves about so much room
 constexpr double kLimitTolerance = 1.05;
-constexpr int kSamples = 12;         // per segment, for the limits
+constexpr int kSamples = 12;  // per segment, for the limits
 constexpr int kStretchRounds = 10;
 constexpr int kSplitRounds = 6;
 constexpr int kSlowRounds = 4;
@@ -86,9 +86,9 @@ void limit_speeds(std::span<const Vector3> path_W, const TrajectoryPoint& start,
   for (std::size_t i = 1; i + 1 < n; ++i) {
     const Vector3 before = path_W[i] - path_W[i - 1];
     const Vector3 after = path_W[i + 1] - path_W[i];
-    speed_mps[i] = std::min({limit_along_mps(before, before.norm(), limits),
-                             limit_along_mps(after, after.norm(), limits),
-                             corner_speed_mps(before, after, a_mps2)});
+    speed_mps[i] =
+        std::min({limit_along_mps(before, before.norm(), limits),
+                  limit_along_mps(after, after.norm(), limits), corner_speed_mps(before, after, a_mps2)});
   }
   speed_mps[n - 1] = 0.0;
   for (std::size_t i = n - 1; i-- > 1;) {

@@ -18,11 +18,12 @@
 namespace roborun::stages {
 
 struct MotionLimits {
-  double speed_mps{VehicleModel{}.speed_mps};          ///< (0, 30]
-  double acceleration_mps2{VehicleModel{}.acceleration_mps2};  ///< (0, 30]. |a| along the whole trajectory, braking included.
-  double jerk_mps3{VehicleModel{}.jerk_mps3};         ///< (0, 1000]. Beyond it the vehicle overshoots the attitude.
-  double climb_mps{30.0};         ///< (0, 30]. Upwards ...
-  double descent_mps{30.0};       ///< (0, 30]. ... and downwards.
+  double speed_mps{VehicleModel{}.speed_mps};  ///< (0, 30]
+  double acceleration_mps2{
+      VehicleModel{}.acceleration_mps2};       ///< (0, 30]. |a| along the whole trajectory, braking included.
+  double jerk_mps3{VehicleModel{}.jerk_mps3};  ///< (0, 1000]. Beyond it the vehicle overshoots the attitude.
+  double climb_mps{30.0};                      ///< (0, 30]. Upwards ...
+  double descent_mps{30.0};                    ///< (0, 30]. ... and downwards.
   [[nodiscard]] constexpr Status validate() const noexcept {
     const bool ok = core::above(speed_mps, 0.0, 30.0) && core::above(acceleration_mps2, 0.0, 30.0) &&
                     core::above(jerk_mps3, 0.0, 1000.0) && core::above(climb_mps, 0.0, 30.0) &&

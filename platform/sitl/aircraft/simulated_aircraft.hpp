@@ -28,8 +28,9 @@ class ExposureSink {
 class SimulatedAircraft final : public flight::Aircraft {
  public:
   /// Stands on the ground at `ground_W`. `cameras` and what is outside must outlive it.
-  SimulatedAircraft(const VehicleModel& vehicle, const SimulatorConfig& config, const Vector3& ground_W, std::uint64_t seed,
-                    Nanos minor_frame, ExposureSink& cameras, const OutsideActuators& outside = {})
+  SimulatedAircraft(const VehicleModel& vehicle, const SimulatorConfig& config, const Vector3& ground_W,
+                    std::uint64_t seed, Nanos minor_frame, ExposureSink& cameras,
+                    const OutsideActuators& outside = {})
       : vehicle_(vehicle, config.wind, ground_W, seed),
         sensors_(NavigationSensors(config.sensors, seed)),
         cameras_(cameras),

@@ -12,9 +12,9 @@
 namespace roborun::stages {
 
 struct OctomapConfig {
-  Aabb bounds_W{};            ///< Space outside is never stored: unknown.
+  Aabb bounds_W{};                                   ///< Space outside is never stored: unknown.
   double vehicle_radius_m{VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is.
-  double view_reach_m{30.0};  ///< Half the side of the exported window. (0, 1000]
+  double view_reach_m{30.0};                         ///< Half the side of the exported window. (0, 1000]
   [[nodiscard]] Status validate() const noexcept {
     const bool ok = is_finite(bounds_W.min_W) && is_finite(bounds_W.max_W) &&
                     bounds_W.size().minCoeff() > 0.0 && core::above(view_reach_m, 0.0, 1000.0);

@@ -63,8 +63,9 @@ TEST(VehicleFile, SaysFileLineKeyAndRange) {
     const std::string said = refusal(replaced(x500, "mass_kg = 2.0", bad));
     EXPECT_EQ(said, "mine.toml:9: mass_kg: must be a number from 0.05 to 100") << bad;
   }
-  EXPECT_NE(refusal(replaced(x500, "mass_kg = 2.0", "mass_kg = 2.0\nmas_kg = 2.0")).find("mas_kg: unknown key"),
-            std::string::npos);
+  EXPECT_NE(
+      refusal(replaced(x500, "mass_kg = 2.0", "mass_kg = 2.0\nmas_kg = 2.0")).find("mas_kg: unknown key"),
+      std::string::npos);
   EXPECT_NE(refusal(replaced(x500, "[drag]", "[darg]")), "");
   EXPECT_NE(refusal("not toml ["), "");
   EXPECT_NE(refusal(""), "");

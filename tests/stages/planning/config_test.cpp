@@ -39,8 +39,9 @@ TEST(MotionLimits, OfARequestAreRefusedNotAsserted) {
   const std::vector<Vector3> path_W{Vector3::Zero(), Vector3(5, 0, 0)};
   Smoother sut;
   core::UnlimitedBudget budget;
-  for (const MotionLimits limits : {MotionLimits{0.0, 4.0}, MotionLimits{6.0, 31.0}, MotionLimits{6.0, 4.0, 0.0},
-                                    MotionLimits{6.0, 4.0, 20.0, 0.0}, MotionLimits{6.0, 4.0, 20.0, 6.0, 0.0}}) {
+  for (const MotionLimits limits :
+       {MotionLimits{0.0, 4.0}, MotionLimits{6.0, 31.0}, MotionLimits{6.0, 4.0, 0.0},
+        MotionLimits{6.0, 4.0, 20.0, 0.0}, MotionLimits{6.0, 4.0, 20.0, 6.0, 0.0}}) {
     EXPECT_EQ(limits.validate(), Status::kInvalidArgument);
     SmoothRequest request;
     request.path_W = path_W;

@@ -13,9 +13,7 @@ constexpr Nanos kFrame{2'500'000};
 
 firmware_if::MotorCommand all(double ratio) { return {{ratio, ratio, ratio, ratio}}; }
 
-double hover_ratio(const VehicleModel& c) {
-  return c.mass_kg * core::kGravity_mps2 / (4.0 * c.max_thrust_N);
-}
+double hover_ratio(const VehicleModel& c) { return c.mass_kg * core::kGravity_mps2 / (4.0 * c.max_thrust_N); }
 
 WindConfig calm() { return {Vector3::Zero(), 0.0, 3.0}; }
 
