@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "platform/input/input_error.hpp"
 #include "stages/perception/brick_map.hpp"
+#include "stages/perception/cloud_images.hpp"
 #include "stages/perception/octomap_backend/octomap_backend.hpp"
 #include "stages/planning/ompl_backend/ompl_backend.hpp"
 #include "stages/planning/rrt_star.hpp"
@@ -14,7 +17,10 @@ namespace {
 stages::BrickMap::Config brick_config(const Aabb& map_bounds_W, const ImageLimits& images) {
   stages::BrickMap::Config config;
   config.bounds_W = map_bounds_W;
-  config.max_image_side = images.side_pixels;
+  config.max_image_width = images.width;
+  config.max_image_height = images.height;
+  config.max_frames = images.frames;
+  config.all_around_frames = images.all_around_frames;
   if (config.validate() != Status::kOk) {
     throw InputError("map: the world is too large for the map: at most 4 million bricks of 4.8 m");
   }
@@ -42,6 +48,24 @@ std::unique_ptr<stages::Planner> make_planner(const std::string& name, core::Are
 }
 
 }  // namespace
+
+ImageLimits image_limits(const SensorRig& rig) noexcept {
+  ImageLimits limits;
+  limits.frames = rig.cameras.size();
+  limits.all_around_frames = cameras_see_all_around(rig) ? rig.cameras.size() : 0;
+  for (const CameraSpec& camera : rig.cameras) {
+    limits.width = std::max(limits.width, camera.width);
+    limits.height = std::max(limits.height, camera.height);
+    limits.range_m = std::max(limits.range_m, camera.range_m);
+  }
+  for (const LidarSpec& lidar : rig.lidars) {
+    limits.frames = std::max(limits.frames, stages::CloudImages::kImages);
+    limits.width = std::max(limits.width, cloud_pixels(lidar));
+    limits.height = std::max(limits.height, cloud_pixels(lidar));
+    limits.range_m = std::max(limits.range_m, lidar.range_m);
+  }
+  return limits;
+}
 
 std::size_t backend_bytes(const Aabb& map_bounds_W, const ImageLimits& images) {
   return stages::BrickMap::arena_bytes(brick_config(map_bounds_W, images)) +

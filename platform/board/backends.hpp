@@ -7,6 +7,7 @@
 
 #include "core/geometry/vector.hpp"
 #include "core/memory/arena.hpp"
+#include "core/sensor_rig.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/planning/planner.hpp"
 
@@ -21,9 +22,13 @@ struct BackendNames {
 
 /// What the map must be able to take.
 struct ImageLimits {
-  std::uint16_t side_pixels{};  ///< The longer side of the largest image.
-  double range_m{};             ///< The farthest that a camera sees.
+  std::uint16_t width{}, height{};  ///< Pixels of the largest image, clouds' images included.
+  double range_m{};                 ///< The farthest that a sensor sees.
+  std::size_t frames{6};            ///< Most images of one scan.
+  /// So many images of cameras see all around; 0: there are not enough of them. (BrickMap::Config)
+  std::size_t all_around_frames{6};
 };
+[[nodiscard]] ImageLimits image_limits(const SensorRig& rig) noexcept;
 
 struct MapAndPlanner {
   std::unique_ptr<stages::OccupancyMap> map;

@@ -62,6 +62,7 @@ struct MissionConfig {
 };
 
 /// The flight through `world`: its bounds, its goal, the height of its start, and the rest from `config`.
+/// Throws InputError for a rig that cannot be.
 [[nodiscard]] flight::FlightConfig flight_config_of(const sitl::World& world, const MissionConfig& config);
 /// Where the vehicle stands before the flight.
 [[nodiscard]] Vector3 ground_below(const sitl::World& world);

@@ -20,6 +20,7 @@
 #include "core/memory/arena.hpp"
 #include "stages/perception/block_sight.hpp"
 #include "stages/perception/brick.hpp"
+#include "stages/perception/cloud_images.hpp"
 #include "stages/perception/depth_pyramid.hpp"
 #include "stages/perception/frame_guard.hpp"
 #include "stages/perception/image_lines.hpp"
@@ -33,11 +34,14 @@ class BrickMap final : public OccupancyMap, private MapView {
     /// Space outside is never stored: unknown.
     Aabb bounds_W{Vector3(-100.0, -100.0, -5.0), Vector3(100.0, 100.0, 20.0)};
     std::size_t max_bricks{9100};  ///< 1,000,000 m3 at 0.3 m. [64, 200000]
-    /// Cameras. Space between two images counts as seen only if all arrived. [1, 8]
-    std::size_t max_frames{6};
-    std::size_t max_image_side{512};  ///< Pixels. [8, 512]
-    double vehicle_radius_m{0.6};     ///< Where the vehicle is, nothing else is: free. [0, 2]
-    double depth_margin_m{0.05};      ///< A cell is free only if every pixel sees this much past it ...
+    std::size_t max_frames{6};     ///< Of one scan. [1, 8]
+    /// So many images of cameras together see every direction: then what lies between two of them is seen, too.
+    /// 0: the cameras do not see all around. (The images of a cloud do.)
+    std::size_t all_around_frames{6};
+    std::size_t max_image_width{512};   ///< Pixels, of the largest image. [8, 1280]
+    std::size_t max_image_height{512};  ///< Pixels, of the largest image. [8, 1280]
+    double vehicle_radius_m{0.6};       ///< Where the vehicle is, nothing else is: free. [0, 2]
+    double depth_margin_m{0.05};        ///< A cell is free only if every pixel sees this much past it ...
     /// ... plus this times depth squared, in metres: three sigma of a stereo camera. 1/m, >= 0.
     double depth_margin_quadratic_per_m{0.0012};
     /// kInvalidArgument if a number is out of range, or the bounds hold more than 4 million bricks.
@@ -103,6 +107,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   struct Position {
     std::int32_t x, y, z;
   };
+  /// A box around everything that a camera of the scan can see, within the bounds.
+  [[nodiscard]] Aabb reach_W() const noexcept;
   [[nodiscard]] std::size_t order_units(const IntegrationRequest& request) noexcept;
   [[nodiscard]] std::size_t unit_index(const Position& unit) const noexcept;
   /// A position as one number, and back: no division.
@@ -148,6 +154,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   /// Whether v0 reached this brick in this scan.
   [[nodiscard]] bool paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
   void free_vehicle() noexcept;
+  /// IntegrationRequest::assumed_half_m.
+  void assume_free(const Vector3& half_m) noexcept;
   [[nodiscard]] bool cell_of(const Vector3& p_W, Cell& cell) const noexcept;
   [[nodiscard]] std::size_t slot_of(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
     return (static_cast<std::size_t>(bz) * static_cast<std::size_t>(ny_) + static_cast<std::size_t>(by)) *

@@ -134,7 +134,7 @@ TEST_F(Replay, RefusesAConfigurationThatNobodyWrote) {
   // The checksum is no secret: whoever makes a file can make it fit. What is in it is checked all the same.
   const auto refused = [&](const char* wanted, const MissionConfig& config) {
     const std::string path = test::scratch("config.rec");
-    sitl::CameraRig rig(world_, config_.simulator.camera, 1);
+    sitl::CameraRig rig(world_, config_.simulator, 1);
     sitl::SimulatedAircraft aircraft(config_.simulator, ground_below(world_), 1, core::kMinorFrame, rig);
     { FlightRecorder recorder(path, flight_config_of(world_, config), config, aircraft, rig.cameras()); }
     try {
