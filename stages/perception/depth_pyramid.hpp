@@ -19,7 +19,7 @@ namespace roborun::stages {
 /// Depths are whole steps of range / 32766, rounded so that bounds stay bounds. Level 0 holds the pixels; an
 /// entry of level k >= 1 covers 2^k x 2^k pixels and they stand 2^(k-1) apart, so that they overlap: any
 /// rectangle of up to 2^k + 2 pixels a side is covered by four of them, with less than 2^(k-1) pixels too
-/// many on each side (none at level 1). Memory from the arena: 10/3 x 4 bytes a pixel.
+/// many on each side (none at level 1). Memory from the arena: 7/3 x 4 bytes a pixel.
 class DepthPyramid {
  public:
   static constexpr int kMaxLevels = 12;  ///< The coarsest covers kMaxImageSide pixels.

@@ -67,6 +67,48 @@ TEST_F(RigFlight, OneFrontCameraReachesTheGoal) {
   EXPECT_LT(most_turn_radps, 1.6) << "not faster than it is told";
 }
 
+TEST_F(RigFlight, ARigThatCannotBeIsRefusedByName) {
+  const auto refusal = [&](auto&& change) -> std::string {
+    config_.simulator.rig.emplace();
+    (void)config_.simulator.rig->cameras.push_back(front());
+    change(*config_.simulator.rig);
+    try {
+      (void)fly_mission(world_, config_, {});
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return {};
+  };
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(refusal([](SensorRig& r) {
+              r.cameras[0].range_m = kNaN;
+            }).find("camera 1: range_m: must be from 1 to 200"),
+            std::string::npos);
+  EXPECT_NE(refusal([](SensorRig& r) { r.cameras[0].tan_half_width = 0.0; }).find("horizontal_fov_deg"),
+            std::string::npos);
+  EXPECT_NE(refusal([](SensorRig& r) { r.cameras[0].range_min_m = 11.0; }).find("range_min_m"),
+            std::string::npos);
+  EXPECT_NE(refusal([](SensorRig& r) { (void)r.lidars.push_back({.rings = 0}); }).find("lidar 1: rings"),
+            std::string::npos);
+  EXPECT_NE(refusal([](SensorRig& r) { r.cameras.clear(); }).find("one sensor at least"), std::string::npos);
+}
+
+TEST_F(RigFlight, MemoryFollowsTheLargestImage) {
+  const auto pyramid_bytes = [&] {
+    std::size_t bytes = 0;
+    for (const report::PoolUse& pool : fly_mission(world_, config_, {}).pools)
+      if (std::string(pool.name) == "map depth pyramid") bytes += pool.element_bytes * pool.count;
+    return bytes;
+  };
+  config_.judge.time_limit_s = 1.0;
+  config_.simulator.rig.emplace();
+  (void)config_.simulator.rig->cameras.push_back(front());
+  const std::size_t small = pyramid_bytes();
+  EXPECT_NEAR(static_cast<double>(small), 160 * 120 * 7.0 / 3.0 * 4.0, 2e3);
+  config_.simulator.rig->cameras[0].width = 320;
+  EXPECT_NEAR(static_cast<double>(pyramid_bytes()), 2.0 * static_cast<double>(small), 4e3);
+}
+
 TEST_F(RigFlight, OneLidarReachesTheGoal) {
   config_.simulator.rig.emplace();
   LidarSpec lidar;

@@ -46,6 +46,9 @@ class BlockSight : public ::testing::Test {
 
 TEST_F(BlockSight, IsBitEqualOnEveryInstructionSet) {
   const std::array<Vector3, 1> here{Vector3(0.1, 0.2, 5.0)};
+  frames_[1].frame.tan_half_height = 0.6F;
+  frames_[3].frame.tan_half_width = 1.3F;
+  frames_[2].frame.range_min_m = 3.0F;
   std::vector<std::uint64_t> digests;
   int sets = 0;
   const std::int64_t all = kernel_instruction_sets();
@@ -89,7 +92,8 @@ TEST_F(BlockSight, ATileKnowsTheLeastAndTheMostOfItsDepths) {
     const std::int64_t set = all & (std::int64_t{1} << rng.below(63));
     if (set == 0) continue;
     const InstructionSet only(set);
-    const std::size_t width = 8 + rng.below(n % 8 == 0 ? 505 : 60), rows = 1 + rng.below(kMaxTile);
+    const std::size_t width = 8 + rng.below(n % 8 == 0 ? kMaxImageSide - 7 : 60),
+                      rows = 1 + rng.below(kMaxTile);
     const auto shift = static_cast<int>(rng.below(4));
     std::vector<float> depth_m(width * rows);
     const std::uint64_t odd_in = n % 3 == 0 ? 4 : 100;
