@@ -4,10 +4,11 @@
 #pragma once
 
 #include <array>
-#include <cmath>
 #include <cstddef>
+#include <optional>
 
 #include "core/geometry/vector.hpp"
+#include "core/stopping_model.hpp"
 
 namespace roborun {
 
@@ -39,6 +40,12 @@ struct VehicleModel {
   double acceleration_mps2{4.0};
   double jerk_mps3{20.0};  ///< On short hops the tilt overshot by 6 degrees without it.
   double tilt_rad{0.60};   ///< 34 degrees: 6.7 m/s2 sideways.
+  double climb_mps{6.0};
+  double descent_mps{6.0};
+  double yaw_rate_radps{1.5};
+
+  /// Measured, of a vehicle that has been flown; none: derived from the limits.
+  std::optional<StoppingModel> measured_stopping{kSitlQuadrotorStopping};
 
   [[nodiscard]] Vector3 inertia_kgm2() const noexcept {
     return {inertia_x_kgm2, inertia_y_kgm2, inertia_z_kgm2};
@@ -55,10 +62,10 @@ struct VehicleKey {
 };
 
 // clang-format off
-inline constexpr std::array<VehicleKey, 21> kVehicleKeys = [] {
+inline constexpr std::array<VehicleKey, 24> kVehicleKeys = [] {
   using V = VehicleModel;
-  return std::array<VehicleKey, 21>{{
-    {"body", "radius_m", &V::radius_m, 0.05, 5.0, "of the sphere around everything that must not touch, propellers included"},
+  return std::array<VehicleKey, 24>{{
+    {"body", "radius_m", &V::radius_m, 0.05, 2.0, "of the sphere around everything that must not touch, propellers included"},
     {"body", "tracking_error_m", &V::tracking_error_m, 0.02, 2.0, "largest distance from the reference in flight: added to the radius for planning"},
     {"body", "mass_kg", &V::mass_kg, 0.05, 100.0, "at take-off, load included"},
     {"body", "inertia_x_kgm2", &V::inertia_x_kgm2, 1e-6, 100.0, "about the forward axis"},
@@ -79,6 +86,9 @@ inline constexpr std::array<VehicleKey, 21> kVehicleKeys = [] {
     {"limits", "acceleration_mps2", &V::acceleration_mps2, 0.2, 30.0, "along a whole trajectory, braking included"},
     {"limits", "jerk_mps3", &V::jerk_mps3, 1.0, 1000.0, "along a whole trajectory"},
     {"limits", "tilt_rad", &V::tilt_rad, 0.05, 1.2, "of the thrust against the vertical"},
+    {"limits", "climb_mps", &V::climb_mps, 0.2, 30.0, "fastest climb"},
+    {"limits", "descent_mps", &V::descent_mps, 0.2, 30.0, "fastest descent"},
+    {"limits", "yaw_rate_radps", &V::yaw_rate_radps, 0.05, 10.0, "fastest turn about the vertical"},
   }};
 }();
 // clang-format on
@@ -91,5 +101,30 @@ inline constexpr std::array<VehicleKey, 21> kVehicleKeys = [] {
   }
   return nullptr;
 }
+
+/// How far it travels until it stands, as trajectories end: measured, or derived from the limits.
+///
+/// A trajectory ends in a minimum-snap stop, whose speed falls from v to 0 within T along
+///   v(t) = v (1 - S(t/T)),  S(x) = 35 x^4 - 84 x^5 + 70 x^6 - 20 x^7   (S' at most 35/16, S'' at most 7.5132)
+/// over the distance v T / 2. The acceleration limit a wants T >= 35/16 v/a, the jerk limit j wants
+/// T^2 >= 7.5132 v/j. With the first alone d = 35/32 v^2/a. Where the second wants more, it is at most
+/// 0.4293 a/j v more: the largest difference of the two over v. Before it brakes, motors take their lag to
+/// tilt the vehicle; after it, it stands as far beside its reference as the tracking error allows.
+/// RT-safe: O(1).
+[[nodiscard]] StoppingModel stopping_model(const VehicleModel& vehicle) noexcept;
+/// Sideways acceleration at the tilt limit, without losing height.
+[[nodiscard]] double tilt_acceleration_mps2(const VehicleModel& vehicle) noexcept;
+/// All four motors' thrust over the weight.
+[[nodiscard]] double thrust_to_weight_ratio(const VehicleModel& vehicle) noexcept;
+/// What pushes back at this air speed, as an acceleration.
+[[nodiscard]] double drag_mps2(const VehicleModel& vehicle, double speed_mps) noexcept;
+/// Distance that plans keep from everything.
+[[nodiscard]] inline double planned_radius_m(const VehicleModel& vehicle) noexcept {
+  return vehicle.radius_m + vehicle.tracking_error_m;
+}
+
+/// What makes a vehicle that no flight is possible with, in words, or null. Precondition: out_of_bounds() is
+/// null. `visible_m` is how far its sensors see.
+[[nodiscard]] const char* cannot_fly(const VehicleModel& vehicle, double visible_m) noexcept;
 
 }  // namespace roborun

@@ -38,8 +38,7 @@ struct CameraMount {
 /// Contract:
 ///  1. read() neither blocks nor allocates.
 ///  2. kOk hands out the newest frame, which stays valid until the next read(); the same frame is never
-///  handed out
-///     twice: then, and before the first one, the answer is kNotReady.
+///     handed out twice: then, and before the first one, the answer is kNotReady.
 class DepthCamera {
  public:
   virtual ~DepthCamera() = default;

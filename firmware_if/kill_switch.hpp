@@ -31,11 +31,12 @@ class KillSwitch {
   /// One sample; true: killed (now or before).
   [[nodiscard]] bool sample() noexcept;
   [[nodiscard]] bool killed() const noexcept { return killed_; }
-  /// Both positions were seen since start: the switch works. Arming needs this.
+  /// Both positions were seen since start: the switch works. TransmitGate::arm() asks for it.
   [[nodiscard]] bool proven() const noexcept { return seen_run_ && seen_pressed_; }
   /// The switch stands on "run" now.
   [[nodiscard]] bool released() const noexcept { return released_; }
-  /// Forgets the kill; only for a disarmed vehicle. kNotReady: the switch does not stand on "run".
+  /// Forgets the kill. kNotReady: the switch does not stand on "run". A gate that was killed stays killed until
+  /// its own reset_kill(), and disarmed after it.
   [[nodiscard]] Status reset() noexcept;
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 

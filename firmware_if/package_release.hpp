@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "firmware_if/assert.hpp"
 #include "firmware_if/gpio.hpp"
 #include "firmware_if/transmit_gate.hpp"
 
@@ -37,9 +38,11 @@ class PackageRelease {
     std::uint64_t refused{};   ///< Commands that gate or bus did not take: repeated in the next step.
   };
 
-  /// Precondition: config.validate() == kOk. `line` may be null; active lets go.
+  /// Precondition, asserted: config.validate() is kOk. `line` may be null; active lets go.
   PackageRelease(const Config& config, TransmitGate& gate, GpioOutput* line) noexcept
-      : config_(config), gate_(gate), line_(line) {}
+      : config_(config), gate_(gate), line_(line) {
+    ROBORUN_ASSERT(config.validate() == Status::kOk);
+  }
 
   /// kOk, or kIo: the line is gone.
   [[nodiscard]] Status step(MonotonicTime now, const Input& in) noexcept;

@@ -1,10 +1,13 @@
 /// The outcome of a call. Vocabulary of the whole project, hence directly in namespace roborun.
-/// "Weather" (a late frame, a full pool, NaN from a sensor) is a Status; our own bug is an assertion.
+/// "Weather" (a late frame, a full pool, NaN from a sensor) is a Status; our own bug is an assertion
+/// (ROBORUN_ASSERT, assert.hpp), which is armed in every build.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <utility>
+
+#include "firmware_if/assert.hpp"
 
 namespace roborun {
 
@@ -61,9 +64,15 @@ class [[nodiscard]] Result {
 
   [[nodiscard]] bool ok() const noexcept { return value_.has_value(); }
   [[nodiscard]] Status status() const noexcept { return status_; }
-  /// Precondition: ok().
-  [[nodiscard]] T& value() noexcept { return *value_; }
-  [[nodiscard]] const T& value() const noexcept { return *value_; }
+  /// Precondition, asserted: ok().
+  [[nodiscard]] T& value() noexcept {
+    ROBORUN_ASSERT(ok());
+    return *value_;
+  }
+  [[nodiscard]] const T& value() const noexcept {
+    ROBORUN_ASSERT(ok());
+    return *value_;
+  }
 
  private:
   std::optional<T> value_{};

@@ -11,7 +11,12 @@ constexpr Nanos kLongestRise{10'000'000};
 
 }  // namespace
 
-Status TransmitGate::arm() noexcept {
+Status TransmitGate::arm(const KillSwitch& kill_switch) noexcept {
+  if (!kill_switch.proven() || !kill_switch.released()) return Status::kNotReady;
+  return kill_switch.killed() ? Status::kInvalidArgument : arm_unproven();
+}
+
+Status TransmitGate::arm_unproven() noexcept {
   if (killed_) return Status::kInvalidArgument;
   armed_ = true;
   return Status::kOk;
@@ -20,6 +25,12 @@ Status TransmitGate::arm() noexcept {
 void TransmitGate::kill() noexcept {
   killed_ = true;
   armed_ = false;
+}
+
+Status TransmitGate::reset_kill(const KillSwitch& kill_switch) noexcept {
+  if (kill_switch.killed() || !kill_switch.released()) return Status::kNotReady;
+  killed_ = false;
+  return Status::kOk;
 }
 
 void TransmitGate::beat(MonotonicTime now) noexcept {

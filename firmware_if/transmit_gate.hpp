@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <span>
 
+#include "firmware_if/assert.hpp"
 #include "firmware_if/can.hpp"
 #include "firmware_if/dronecan/transfer.hpp"
+#include "firmware_if/kill_switch.hpp"
 #include "firmware_if/status.hpp"
 #include "firmware_if/time.hpp"
 
@@ -59,18 +61,25 @@ class TransmitGate {
     std::uint64_t limited{};  ///< Throttles clamped or slowed.
   };
 
-  /// Precondition: config.validate() == kOk.
-  TransmitGate(const Config& config, CanBus& bus) noexcept : config_(config), bus_(bus) {}
+  /// Precondition, asserted: config.validate() is kOk.
+  TransmitGate(const Config& config, CanBus& bus) noexcept : config_(config), bus_(bus) {
+    ROBORUN_ASSERT(config.validate() == Status::kOk);
+  }
 
   /// Our own node id; 0: none yet, only allocation requests leave.
   void set_node_id(std::uint8_t node_id) noexcept { node_id_ = node_id; }
   [[nodiscard]] std::uint8_t node_id() const noexcept { return node_id_; }
-  /// Refused with kInvalidArgument while killed.
-  [[nodiscard]] Status arm() noexcept;
+  /// Arms a vehicle that has a kill switch. kNotReady: the switch is not proven, or it is not on "run".
+  /// kInvalidArgument: killed.
+  [[nodiscard]] Status arm(const KillSwitch& kill_switch) noexcept;
+  /// Arms without the proof that a kill switch works: simulation, and motors without propellers.
+  /// kInvalidArgument: killed.
+  [[nodiscard]] Status arm_unproven() noexcept;
   void disarm() noexcept { armed_ = false; }
-  /// Latched: disarms, and stays until reset_kill(), which needs a disarmed vehicle and a released switch.
+  /// Disarms, and stays until reset_kill().
   void kill() noexcept;
-  void reset_kill() noexcept { killed_ = false; }
+  /// Forgets the kill; the vehicle stays disarmed. kNotReady: the switch is still killed, or not on "run".
+  [[nodiscard]] Status reset_kill(const KillSwitch& kill_switch) noexcept;
   void allow_release(bool allowed) noexcept { release_allowed_ = allowed; }
   /// The checked control cycle is alive. Nothing else may call this.
   void beat(MonotonicTime now) noexcept;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/range.hpp"
+
 namespace roborun::core {
 
 StageCost slower(const StageCost& cost, double factor) noexcept {
@@ -10,6 +12,20 @@ StageCost slower(const StageCost& cost, double factor) noexcept {
   for (double& s : result.fixed_s) s *= factor;
   for (double& s : result.per_m3_s) s *= factor;
   return result;
+}
+
+Status StageCost::validate() const noexcept {
+  constexpr double kMost_s = 1e6;
+  bool ok = within(per_unit_s, 0.0, kMost_s);
+  for (const double s : fixed_s) ok = ok && within(s, 0.0, kMost_s);
+  for (const double s : per_m3_s) ok = ok && within(s, 0.0, kMost_s);
+  return ok ? Status::kOk : Status::kInvalidArgument;
+}
+
+Status CostProfile::validate() const noexcept {
+  const bool ok = std::all_of(stage.begin(), stage.end(),
+                              [](const StageCost& cost) { return cost.validate() == Status::kOk; });
+  return ok ? Status::kOk : Status::kInvalidArgument;
 }
 
 Nanos CostProfile::cost(StageId id, const Work& work) const noexcept {

@@ -6,15 +6,18 @@
 
 #include "core/executive/stage_budget.hpp"
 #include "core/precision.hpp"
+#include "firmware_if/status.hpp"
 #include "firmware_if/time.hpp"
 
 namespace roborun::core {
 
 /// cost = fixed_s[level] + units * per_unit_s + volume_m3 * per_m3_s[level]
 struct StageCost {
-  std::array<double, kPrecisionLevels> fixed_s{};
-  double per_unit_s{};
-  std::array<double, kPrecisionLevels> per_m3_s{};
+  std::array<double, kPrecisionLevels> fixed_s{};   ///< Each [0, 1e6].
+  double per_unit_s{};                              ///< [0, 1e6]
+  std::array<double, kPrecisionLevels> per_m3_s{};  ///< Each [0, 1e6].
+  /// Nobody gets time back for working: nothing may be negative. The upper end keeps a cost within Nanos.
+  [[nodiscard]] Status validate() const noexcept;
 };
 
 /// Everything `factor` times as expensive.
@@ -24,6 +27,8 @@ struct CostProfile {
   StageArray<StageCost> stage{};
 
   [[nodiscard]] const StageCost& of(StageId id) const noexcept { return stage[id]; }
+  /// kOk if that of every stage is.
+  [[nodiscard]] Status validate() const noexcept;
   /// Never negative; a level out of range is clamped. RT-safe: O(1).
   [[nodiscard]] Nanos cost(StageId id, const Work& work) const noexcept;
 };

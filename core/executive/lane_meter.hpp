@@ -4,6 +4,7 @@
 #include "core/executive/lane_executive.hpp"
 #include "core/executive/stage_meter.hpp"
 #include "core/executive/virtual_clock.hpp"
+#include "firmware_if/assert.hpp"
 
 namespace roborun::core {
 
@@ -31,8 +32,11 @@ class ClockMeter final : public StageMeter {
 /// Lockstep: work costs what the profile says, and the lane's clock moves on by it.
 class CostProfileMeter final : public StageMeter {
  public:
+  /// Precondition, asserted: profile.validate() is kOk.
   CostProfileMeter(const CostProfile& profile, VirtualClock& clock) noexcept
-      : profile_(profile), clock_(clock) {}
+      : profile_(profile), clock_(clock) {
+    ROBORUN_ASSERT(profile.validate() == Status::kOk);
+  }
   void attach(LaneExecutive& lane) noexcept { lane_ = &lane; }
   void charge_to(StageId id) noexcept override { lane_->charge_to(slot_of(id)); }
   [[nodiscard]] Nanos cost(StageId id, const Work& work) const noexcept override {

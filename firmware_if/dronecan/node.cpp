@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "firmware_if/assert.hpp"
+
 namespace roborun::firmware_if::dronecan {
 namespace {
 
@@ -73,6 +75,7 @@ Node::Node(const Config& config, TransmitGate& gate, CanBus& bus,
       bus_(bus),
       reassembler_(kSubscribed, sessions, config.node_id),
       allocation_(config.unique_id, 0) {
+  ROBORUN_ASSERT(config.validate() == Status::kOk);
   gate_.set_node_id(config.node_id);
 }
 

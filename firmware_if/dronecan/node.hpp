@@ -65,8 +65,8 @@ class Node {
  public:
   struct Config {
     std::uint8_t node_id{10};  ///< 1 .. 127; 0: ask the allocator.
-    std::array<std::uint8_t, 16>
-        unique_id{};  ///< Of this vehicle's computer; all zero is refused with node_id 0.
+    /// Of this vehicle's computer; all zero is refused with node_id 0.
+    std::array<std::uint8_t, 16> unique_id{};
     std::string_view name{"org.roborun"};  ///< At most 80 bytes; must outlive the node.
     std::uint8_t esc_count{4};             ///< As the gate's.
     Nanos command_period{2'500'000};       ///< 2.5 ms .. 20 ms: 50 .. 400 Hz.
@@ -92,7 +92,7 @@ class Node {
     std::uint64_t bus_errors{};
   };
 
-  /// Preconditions: config.validate() == kOk; gate sends on `bus`.
+  /// Preconditions: config.validate() is kOk, asserted; gate sends on `bus`.
   Node(const Config& config, TransmitGate& gate, CanBus& bus,
        std::span<Reassembler::Session> sessions) noexcept;
 

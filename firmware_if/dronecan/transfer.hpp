@@ -69,12 +69,13 @@ struct TransferHeader {
 
 /// What became of a frame.
 enum class FrameVerdict : std::uint8_t {
-  kDelivered,        ///< It completed a transfer.
-  kAccepted,         ///< It continues one.
-  kNotOurs,          ///< A type that is not subscribed, or a service of another node.
-  kDuplicate,        ///< Repeats the last frame taken, or the start of the last transfer delivered.
-  kMalformed,        ///< No tail byte, a start with toggle, a short frame in the middle, an empty end, an
-                     ///< anonymous multi-frame transfer. Ends the transfer that it belongs to.
+  kDelivered,  ///< It completed a transfer.
+  kAccepted,   ///< It continues one.
+  kNotOurs,    ///< A type that is not subscribed, or a service of another node.
+  kDuplicate,  ///< Repeats the last frame taken, or the start of the last transfer delivered.
+  /// No tail byte, a start with toggle, a short frame in the middle, an empty end, an anonymous multi-frame
+  /// transfer. Ends the transfer that it belongs to.
+  kMalformed,
   kMissedStart,      ///< In the middle of something whose start never came.
   kWrongTransferId,  ///< Belongs to another transfer than the one being received, which goes on.
   kWrongToggle,      ///< A frame was lost: the transfer is given up.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "firmware_if/assert.hpp"
+
 namespace roborun::governor {
 namespace {
 
@@ -16,11 +18,13 @@ double raw_budget_s(double visible_m, double speed_mps, const StoppingModel& mod
   return 0.0;
 }
 
-/// Least s + max(b(s), 0) over one segment, speed and visibility linear in u = s - begin. With d_stop = q v^2
-/// + l v
-/// + c the derivative is (1 - q v') + (d' v - v' (d - c)) / v^2, whose second numerator does not depend on u:
-/// one stationary speed. Where the rest d - d_stop crosses zero, b ends; below the speed where d_stop is
-/// clamped to zero, the same holds with q = l = c = 0.
+/// Least s + max(b(s), 0) over one segment, speed v and visibility d linear in u = s - begin. With
+///   d_stop = q v^2 + l v + c     b = (d - d_stop) / v = (d - c) / v - q v - l
+/// the derivative of u + b is
+///   (1 - q v') + (d' v - v' (d - c)) / v^2
+/// The second numerator does not depend on u (its own derivative is d' v' - v' d' = 0), so there is one
+/// stationary speed. Where the rest d - d_stop crosses zero, b ends; below the speed where d_stop is clamped
+/// to zero, the same holds with q = l = c = 0.
 double least_over_segment_s(const TrajectoryOutlook& a, const TrajectoryOutlook& b,
                             const StoppingModel& model, double longest_s) noexcept {
   const double duration_s = b.time_s - a.time_s;
@@ -68,12 +72,14 @@ double least_over_segment_s(const TrajectoryOutlook& a, const TrajectoryOutlook&
 
 Nanos time_budget(double visible_m, double speed_mps, const StoppingModel& model,
                   const BudgetLimits& limits) noexcept {
+  ROBORUN_ASSERT(limits.validate() == Status::kOk);
   const double budget_s = raw_budget_s(visible_m, speed_mps, model, seconds(limits.longest));
   return std::clamp(from_seconds(budget_s), limits.shortest, limits.longest);
 }
 
 Nanos trajectory_budget(std::span<const TrajectoryOutlook> outlook, const StoppingModel& model,
                         const BudgetLimits& limits) noexcept {
+  ROBORUN_ASSERT(limits.validate() == Status::kOk);
   if (outlook.empty()) return limits.shortest;
   const double longest_s = seconds(limits.longest);
   double best_s = longest_s;

@@ -9,6 +9,13 @@
 
 namespace roborun::governor {
 
+Status LatencyModel::validate() const noexcept {
+  bool ok = true;
+  for (const double s : fixed_s) ok = ok && std::isfinite(s) && s >= 0.0;
+  for (const double s : slope_s_per_m3) ok = ok && std::isfinite(s) && s >= 0.0;
+  return ok ? Status::kOk : Status::kInvalidArgument;
+}
+
 double LatencyModel::latency_s(int level, double volume_m3) const noexcept {
   const auto i = static_cast<std::size_t>(std::clamp(level, 0, kPrecisionLevels - 1));
   return fixed_s[i] + slope_s_per_m3[i] * std::max(volume_m3, 0.0);

@@ -1,4 +1,4 @@
-/// How long a stage takes at a precision and volume. Source: RoboRun Eq. 4, with a constant a level added.
+/// How long a stage takes at a precision and volume. Source: RoboRun Eq. 4, with one constant per level added.
 #pragma once
 
 #include <array>
@@ -6,6 +6,7 @@
 
 #include "core/executive/cost_profile.hpp"
 #include "core/precision.hpp"
+#include "firmware_if/status.hpp"
 #include "governor/models/knob.hpp"
 
 namespace roborun::governor {
@@ -16,6 +17,8 @@ struct LatencyModel {
   std::array<double, kPrecisionLevels> fixed_s{};
   std::array<double, kPrecisionLevels> slope_s_per_m3{};
 
+  /// kOk if all coefficients are finite and >= 0.
+  [[nodiscard]] Status validate() const noexcept;
   [[nodiscard]] double latency_s(int level, double volume_m3) const noexcept;
 };
 

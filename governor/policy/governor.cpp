@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "core/range.hpp"
+#include "firmware_if/assert.hpp"
+
 namespace roborun::governor {
 namespace {
 
@@ -67,7 +70,33 @@ const char* to_string(BudgetSource source) noexcept {
   return "unknown";
 }
 
+Status Policy::validate() const noexcept {
+  const bool times_ok = shortest > Nanos{0} && longest >= shortest && longest_budget >= longest;
+  const bool precision_ok = core::within(failures_until_finer, 1, 100) &&
+                            core::within(coarser_levels_per_decision, 1, kPrecisionLevels) &&
+                            core::within(cells_to_obstacle, 1.0, 100.0);
+  const bool volume_ok = core::above(planner_share, 0.0, 1.0) && core::above(open_planner_m3, 0.0, 1e6);
+  const bool speed_ok = core::within(near_goal_m, 0.0, 1000.0) &&
+                        core::above(near_goal_speed_mps, 0.0, 30.0) &&
+                        core::above(motion_speed_mps, 0.0, 30.0);
+  const bool ok = times_ok && precision_ok && volume_ok && speed_ok &&
+                  core::within(decisions_per_budget, 1.0, 10.0) && core::within(reserve_ratio, 0.0, 0.5);
+  return ok ? Status::kOk : Status::kInvalidArgument;
+}
+
+Status GovernorConfig::validate() const noexcept {
+  bool ok = policy.validate() == Status::kOk && stopping.validate() == Status::kOk;
+  for (const LatencyModel& m : model) ok = ok && m.validate() == Status::kOk;
+  for (const double fixed_s : {point_cloud_s, governor_s, smoother_s})
+    ok = ok && core::within(fixed_s, 0.0, 1e6);
+  ok = ok && core::above(v_max_mps, 0.0, 30.0) && core::above(vehicle_width_m, 0.0, 20.0) &&
+       core::above(sensor_volume_max_m3, 0.0, 1e9) && core::within(coarsest_level, 0, kPrecisionLevels - 1) &&
+       core::above(design_visibility_m, 0.0, 1000.0) && minor_frame > Nanos{0};
+  return ok ? Status::kOk : Status::kInvalidArgument;
+}
+
 Governor::Governor(const GovernorConfig& config) noexcept : config_(config) {
+  ROBORUN_ASSERT(config.validate() == Status::kOk);
   switch (config.design) {
     case Design::kAware:
       v_max_mps_ = config.v_max_mps;

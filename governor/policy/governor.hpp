@@ -8,6 +8,7 @@
 #include "core/executive/cost_profile.hpp"
 #include "core/operating_point.hpp"
 #include "core/space_profile.hpp"
+#include "core/vehicle_model.hpp"
 #include "governor/budget/time_budget.hpp"
 #include "governor/models/latency_model.hpp"
 #include "governor/solver/lattice_solver.hpp"
@@ -26,30 +27,33 @@ enum class Design : std::uint8_t {
 enum class BudgetSource : std::uint8_t { kTrajectory, kVisibility, kShortest, kLongest, kFailures, kFixed };
 [[nodiscard]] const char* to_string(BudgetSource source) noexcept;
 
-/// The extra rules beyond Eq. 3, one row each.
+/// The extra rules beyond Eq. 3: one field per rule.
 struct Policy {
   /// A frame taken at t0 gives a trajectory that takes over at t0 + T and should last until its successor
   /// does, at t0 + 2 T. Measured, 1.5 flies fastest: the next budget is counted from a newer frame. (The
-  /// authors' code divides by 2.)
+  /// authors' code divides by 2.) [1, 10]: below 1 the answer comes after the time it is for.
   double decisions_per_budget{1.5};
-  Nanos shortest{200'000'000};  ///< No decision shorter than this.
+  Nanos shortest{200'000'000};  ///< No decision shorter than this. > 0.
   /// More thinking than this makes flight slower, not better, unless the precision that the space asks for
-  /// takes longer.
+  /// takes longer. >= shortest.
   Nanos longest{800'000'000};
-  Nanos longest_budget{15'000'000'000};  ///< The authors' cap: what a standing vehicle is given.
-  int failures_until_finer{2};           ///< From this many failed decisions on, one level finer for each.
-  int coarser_levels_per_decision{1};    ///< Precision is lost slowly and won at once.
-  double cells_to_obstacle{2.0};  ///< At least so many cells between the vehicle and the nearest obstacle.
-  double planner_share{0.4};      ///< Of the perceived space, what a plan through it explores at most.
+  Nanos longest_budget{15'000'000'000};  ///< The authors' cap: what a standing vehicle is given. >= longest.
+  /// From this many failed decisions on, one level finer for each. [1, 100]
+  int failures_until_finer{2};
+  int coarser_levels_per_decision{1};  ///< Precision is lost slowly and won at once. [1, kPrecisionLevels]
+  /// At least so many cells between the vehicle and the nearest obstacle. [1, 100]
+  double cells_to_obstacle{2.0};
+  double planner_share{0.4};  ///< Of the perceived space, what a plan through it explores at most. (0, 1]
   /// The same in the open: not quite two of the planner's cells of 4.8 m, so that with the ends of the
-  /// straight way the search is over. The deadline stays that of a search.
+  /// straight way the search is over. The deadline stays that of a search. (0, 1e6]
   double open_planner_m3{220.0};
-  double near_goal_m{8.0};          ///< Nearer than this: at most 0.6 m cells ...
-  double near_goal_speed_mps{2.5};  ///< ... and this speed.
+  double near_goal_m{8.0};          ///< Nearer than this: at most 0.6 m cells [0, 1000] ...
+  double near_goal_speed_mps{2.5};  ///< ... and this speed. (0, 30]
   /// While something moves nearby: no longer thinking than precision asks for, and this speed. At 2.5 m/s,
-  /// and without stopping at once what is faster, 8 of 40 crossings ended in a collision.
+  /// and without stopping at once what is faster, 8 of 40 crossings ended in a collision. (0, 30]
   double motion_speed_mps{1.2};
-  double reserve_ratio{0.06};  ///< Share of the deadline that is not planned for.
+  double reserve_ratio{0.06};  ///< Share of the deadline that is not planned for. [0, 0.5]
+  [[nodiscard]] Status validate() const noexcept;
 };
 
 struct GovernorConfig {
@@ -57,16 +61,19 @@ struct GovernorConfig {
   Policy policy{};
   StoppingModel stopping{kSitlQuadrotorStopping};
   KnobArray<LatencyModel> model{};
-  double point_cloud_s{};  ///< Fixed costs of the other stages. >= 0.
+  double point_cloud_s{};  ///< Fixed costs of the other stages. Each [0, 1e6].
   double governor_s{};     ///< 0 for the static designs: they have none.
   double smoother_s{};
-  double v_max_mps{6.0};  ///< RoboRun Table "Knob values"; the static design's is 0.5.
-  double vehicle_width_m{1.2};
-  double sensor_volume_max_m3{60e3};  ///< The most that the cameras can see between the height limits.
-  int coarsest_level{3};              ///< Cells must fit several times into the flight band.
-  double design_visibility_m{
-      10.0};  ///< static-fair: the worst visibility of the congested zones (authors: 8 to 10 m).
-  Nanos minor_frame{2'500'000};
+  double v_max_mps{
+      VehicleModel{}.speed_mps};  ///< RoboRun Table "Knob values"; the static design's is 0.5. (0, 30]
+  double vehicle_width_m{2.0 * VehicleModel{}.radius_m};  ///< (0, 20]
+  /// The most that the cameras can see between the height limits. (0, 1e9]
+  double sensor_volume_max_m3{60e3};
+  int coarsest_level{3};  ///< Cells must fit several times into the flight band. [0, kPrecisionLevels)
+  /// static-fair: the worst visibility of the congested zones (authors: 8 to 10 m). (0, 1000]
+  double design_visibility_m{10.0};
+  Nanos minor_frame{2'500'000};  ///< > 0.
+  [[nodiscard]] Status validate() const noexcept;
 };
 
 struct Situation {
@@ -89,9 +96,10 @@ struct Decision {
   bool open{};        ///< Nothing stands ahead: the straight way, as far as it is free, is the plan.
 };
 
-/// One instance a vehicle. RT-safe: O(1), no allocation.
+/// One instance per vehicle. RT-safe: O(1), no allocation.
 class Governor {
  public:
+  /// Precondition, asserted: config.validate() is kOk.
   explicit Governor(const GovernorConfig& config) noexcept;
 
   [[nodiscard]] Decision decide(const SpaceProfile& profile, const Situation& situation) noexcept;

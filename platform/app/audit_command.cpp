@@ -26,6 +26,7 @@ struct AuditOptions {
   std::string env{"14"};
   std::uint64_t seed{1};
   std::string profile{"host"};
+  std::string vehicle{"paper"};
   std::string settings;
   bool load{false};
   bool json{false};
@@ -93,6 +94,7 @@ int audit(const AuditOptions& options) {
                     "320 or 400",
                     options.rate_Hz));
   mission::RealTimeConfig config;
+  mission::set_vehicle(config.mission, vehicle::load_vehicle(options.vehicle));
   if (!options.settings.empty()) mission::load_settings(options.settings, config.mission);
   config.inject = injection_of(options.spin);
   const sitl::NamedEnvironment environment = sitl::environment(options.env);
@@ -163,6 +165,10 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
       ->add_option("--profile", options->profile,
                    "What the governor expects stages to cost: paper, host (measured once), or a file of "
                    "roborun calibrate")
+      ->capture_default_str();
+  command
+      ->add_option("--vehicle", options->vehicle,
+                   "Vehicle: a shipped one (roborun vehicle list), or a vehicle file")
       ->capture_default_str();
   command->add_option("--settings", options->settings,
                       "TOML file: cameras, wind, battery, fence (see platform/README.md)");

@@ -124,7 +124,7 @@ int calibrate_stopping(const CalibrateOptions& options) {
     });
   }
   const board::StoppingFit fit = board::fit_stopping(points);
-  const governor::StoppingModel& m = fit.model;
+  const StoppingModel& m = fit.model;
   std::string toml = fmt::format(
       "# How far the simulated quadrotor travels until it stands; written by roborun calibrate --stopping.\n"
       "[stopping]\nquadratic_s2pm = {:.6f}\nlinear_s = {:.6f}\nconstant_m = {:.6f}\n",
@@ -143,7 +143,7 @@ int calibrate_stopping(const CalibrateOptions& options) {
   fmt::print("{:>8} {:>11} {:>9} {:>9}\n", "v, m/s", "stop, m", "fit, m", "used, m");
   for (const board::StoppingPoint& p : points) {
     fmt::print("{:>8.1f} {:>11.3f} {:>9.3f} {:>9.3f}\n", p.speed_mps, p.distance_m, m.distance_m(p.speed_mps),
-               governor::kSitlQuadrotorStopping.distance_m(p.speed_mps));
+               kSitlQuadrotorStopping.distance_m(p.speed_mps));
   }
   fmt::print("d_stop = {:.4f} v^2 + {:.4f} v + {:.4f}, relative mean squared error {:.2f} %\n",
              m.quadratic_s2pm, m.linear_s, m.constant_m, 100.0 * fit.mean_squared_relative);

@@ -38,6 +38,7 @@ struct FlyOptions {
   std::string world;
   std::string start;
   std::string goal;
+  std::string vehicle{"paper"};
   std::string settings;
   std::string host_file;
   double host_factor{1.0};
@@ -98,6 +99,7 @@ int fly(const FlyOptions& options) {
     if (!error.empty()) throw InputError(error);
   }
   mission::MissionConfig config;
+  mission::set_vehicle(config, vehicle::load_vehicle(options.vehicle));
   if (!options.settings.empty()) mission::load_settings(options.settings, config);
   const sitl::Endpoints endpoints{point_of("--start", options.start), point_of("--goal", options.goal)};
   std::string env;
@@ -118,6 +120,7 @@ int fly(const FlyOptions& options) {
     title = fmt::format("Environment {} ({}), {}, seed {}", named.number, named.name, options.mission, seed);
   }
   const board::Profile profile = profile_of(options);
+  if (options.vehicle != "paper") title += fmt::format(", vehicle {}", options.vehicle);
   title += fmt::format(", cost profile {}", options.profile);
 
   config.profile_name = options.profile;
@@ -214,6 +217,10 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
   fly_app->add_option("--world", options->world, "World from a file instead: .toml, or OctoMap .bt / .ot");
   fly_app->add_option("--start", options->start, "With --world: X,Y,Z in metres");
   fly_app->add_option("--goal", options->goal, "With --world: X,Y,Z in metres");
+  fly_app
+      ->add_option("--vehicle", options->vehicle,
+                   "Vehicle: a shipped one (roborun vehicle list), or a vehicle file")
+      ->capture_default_str();
   fly_app->add_option("--settings", options->settings,
                       "Cameras, wind, battery, speed from a TOML file (see platform/README.md)");
   fly_app->add_option("--record", options->record,

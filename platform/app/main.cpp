@@ -8,6 +8,7 @@
 #include <functional>
 #include <string>
 
+#include "firmware_if/assert.hpp"
 #include "platform/app/audit_command.hpp"
 #include "platform/app/calibrate_command.hpp"
 #include "platform/app/can_command.hpp"
@@ -20,6 +21,7 @@
 #include "platform/app/scenario_command.hpp"
 #include "platform/app/solve_command.hpp"
 #include "platform/app/sweep_command.hpp"
+#include "platform/app/vehicle_command.hpp"
 #include "platform/input/input_error.hpp"
 
 namespace {
@@ -30,10 +32,16 @@ int complain(const std::string& what) {
   return 2;
 }
 
+void report_bug(const char* condition, const char* file, int line) noexcept {
+  // Not through fmt: this thread may be a lane's, and its heap sealed.
+  std::fprintf(stderr, "roborun: a bug of ours: %s:%d: '%s' does not hold\n", file, line, condition);
+}
+
 }  // namespace
 
 // Formatting an error line can throw only where memory is gone: then std::terminate is the right end.
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
+  roborun::set_assertion_handler(&report_bug);
   CLI::App app{"roborun: a navigation runtime for drones that thinks as long as it can afford to"};
   app.name("roborun");
   app.require_subcommand(1);
@@ -51,6 +59,7 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   roborun::app::add_sweep_command(app, run);
   roborun::app::add_scenario_command(app, run);
   roborun::app::add_replay_command(app, run);
+  roborun::app::add_vehicle_command(app, run);
   try {
     app.parse(argc, argv);
     return run ? run() : 2;

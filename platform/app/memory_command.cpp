@@ -15,6 +15,7 @@ namespace {
 
 struct MemoryOptions {
   std::string env{"14"};
+  std::string vehicle{"paper"};
   double fly_s{0.0};
   bool json{false};
 };
@@ -24,6 +25,7 @@ int memory(const MemoryOptions& options) {
       sitl::generate(sitl::environment(options.env).knobs, sitl::Mission::kPackageDelivery, 1);
   const board::Profile profile = board::paper();
   mission::MissionConfig config;
+  mission::set_vehicle(config, vehicle::load_vehicle(options.vehicle));
   config.flight.costs = profile.costs;
   config.flight.model = profile.model;
   // Lockstep: what a mission uses does not depend on how fast it is simulated.
@@ -72,6 +74,10 @@ void add_memory_command(CLI::App& app, std::function<int()>& run) {
       "Examples:\n  roborun memory\n  roborun memory --fly 300    high-water marks of 300 s of flight in "
       "lockstep");
   command->add_option("--env", options->env, "Environment: 1 .. 27, or a name")->capture_default_str();
+  command
+      ->add_option("--vehicle", options->vehicle,
+                   "Vehicle: a shipped one (roborun vehicle list), or a vehicle file")
+      ->capture_default_str();
   command->add_option("--fly", options->fly_s, "Fly for so many virtual seconds first");
   command->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
   command->callback([options, &run] { run = [options] { return memory(*options); }; });

@@ -30,6 +30,7 @@ struct SweepOptions {
   std::string seeds{"1"};
   std::string map{"own"};
   std::string planner{"own"};
+  std::string vehicle{"paper"};
   std::string settings;
   std::string jobs{std::to_string(std::max(1U, std::thread::hardware_concurrency()))};
   std::string shard{"1/1"};
@@ -96,6 +97,9 @@ evaluation::SweepPlan plan_of(const SweepOptions& options, evaluation::SweepInpu
   set_shard(options.shard, plan);
   plan.map = options.map;
   plan.planner = options.planner;
+  const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.vehicle);
+  mission::set_vehicle(inputs.base, vehicle);
+  plan.vehicle = fmt::format("{} {}", vehicle.name, vehicle.digest);
   if (!options.settings.empty()) {
     mission::load_settings(options.settings, inputs.base);
     plan.settings = evaluation::digest_of(input::read_text(options.settings, "a readable TOML file"));
@@ -229,6 +233,10 @@ void add_sweep_command(CLI::App& app, std::function<int()>& run) {
   sweep_app
       ->add_option("--planner", options->planner,
                    "own, ompl:RRTstar, ompl:InformedRRTstar, ompl:RRTConnect, ompl:BITstar")
+      ->capture_default_str();
+  sweep_app
+      ->add_option("--vehicle", options->vehicle,
+                   "Vehicle: a shipped one (roborun vehicle list), or a vehicle file")
       ->capture_default_str();
   sweep_app->add_option("--settings", options->settings,
                         "Cameras, wind, battery, speed from a TOML file (see platform/README.md)");

@@ -21,6 +21,7 @@ stages::BrickMap::Config brick_config(const Aabb& map_bounds_W, const ImageLimit
   config.max_image_height = images.height;
   config.max_frames = images.frames;
   config.all_around_frames = images.all_around_frames;
+  config.vehicle_radius_m = images.vehicle_radius_m;
   if (config.validate() != Status::kOk) {
     throw InputError("map: the world is too large for the map: at most 4 million bricks of 4.8 m");
   }
@@ -30,7 +31,8 @@ stages::BrickMap::Config brick_config(const Aabb& map_bounds_W, const ImageLimit
 std::unique_ptr<stages::OccupancyMap> make_map(const std::string& name, const Aabb& bounds_W,
                                                const ImageLimits& images, core::Arena& arena) {
   if (name == "own") return std::make_unique<stages::BrickMap>(brick_config(bounds_W, images), arena);
-  if (name == "octomap") return stages::make_octomap_backend({bounds_W, images.range_m + 5.0});
+  if (name == "octomap")
+    return stages::make_octomap_backend({bounds_W, images.vehicle_radius_m, images.range_m + 5.0});
   throw InputError(fmt::format("unknown map '{}': must be own or octomap", name));
 }
 
@@ -49,8 +51,9 @@ std::unique_ptr<stages::Planner> make_planner(const std::string& name, core::Are
 
 }  // namespace
 
-ImageLimits image_limits(const SensorRig& rig) noexcept {
+ImageLimits image_limits(const SensorRig& rig, const VehicleModel& vehicle) noexcept {
   ImageLimits limits;
+  limits.vehicle_radius_m = vehicle.radius_m;
   limits.frames = rig.cameras.size();
   limits.all_around_frames = cameras_see_all_around(rig) ? rig.cameras.size() : 0;
   for (const CameraSpec& camera : rig.cameras) {

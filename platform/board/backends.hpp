@@ -8,6 +8,7 @@
 #include "core/geometry/vector.hpp"
 #include "core/memory/arena.hpp"
 #include "core/sensor_rig.hpp"
+#include "core/vehicle_model.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/planning/planner.hpp"
 
@@ -27,8 +28,9 @@ struct ImageLimits {
   std::size_t frames{6};            ///< Most images of one scan.
   /// So many images of cameras see all around; 0: there are not enough of them. (BrickMap::Config)
   std::size_t all_around_frames{6};
+  double vehicle_radius_m{VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is.
 };
-[[nodiscard]] ImageLimits image_limits(const SensorRig& rig) noexcept;
+[[nodiscard]] ImageLimits image_limits(const SensorRig& rig, const VehicleModel& vehicle) noexcept;
 
 struct MapAndPlanner {
   std::unique_ptr<stages::OccupancyMap> map;

@@ -131,7 +131,7 @@ class Sweeper {
     request.start_W = here[0];
     request.goal_W = world_.goal_W();
     request.bounds_W = world_.bounds_W();
-    request.radius_m = 0.9;
+    request.radius_m = planned_radius_m(VehicleModel{});
     request.volume_m3 = share * kPlannerShare * seen_m3;
     request.horizon_m = 24.0;
     request.seed = seed;
@@ -144,7 +144,7 @@ class Sweeper {
     stages::SmoothRequest smooth;
     smooth.path_W = {planned.path_W.begin(), planned.path_W.size()};
     smooth.start.p_W = here[0];
-    smooth.radius_m = 0.9;
+    smooth.radius_m = planned_radius_m(VehicleModel{});
     stages::SmoothResult smoothed;
     s = timed([&] { (void)smoother_.smooth(smooth, backends.map->view(), unlimited, smoothed); });
     add_units(core::StageId::kSmoother, s, smoothed.work);

@@ -17,7 +17,7 @@ constexpr Nanos kMinorFrame{2'500'000};
 double stopping_distance_m(double speed_mps, std::uint64_t seed) {
   sitl::Vehicle vehicle({}, {}, Vector3::Zero(), seed);
   sitl::NavigationSensors sensors({}, seed);
-  flight::FlightControl lane({}, {});
+  flight::FlightControl lane({}, seconds(kMinorFrame));
   const auto line = [](const Vector3& from_W, const Vector3& to_W, double top_mps, MonotonicTime start) {
     Trajectory t;
     t.start_time = start;
@@ -41,8 +41,7 @@ double stopping_distance_m(double speed_mps, std::uint64_t seed) {
   while (now < begin) step();
   Trajectory brake;
   const stages::Smoother smoother;
-  if (smoother.brake(cruise.at(begin), begin, {30.0, flight::PipelineConfig{}.acceleration_mps2}, brake) !=
-      Status::kOk)
+  if (smoother.brake(cruise.at(begin), begin, {30.0, VehicleModel{}.acceleration_mps2}, brake) != Status::kOk)
     return 0.0;
   lane.offer(brake);
   const Vector3 at_W = vehicle.state().p_WB;

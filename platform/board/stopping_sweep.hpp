@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "governor/models/stopping_model.hpp"
+#include "core/stopping_model.hpp"
 
 namespace roborun::board {
 
@@ -21,7 +21,7 @@ struct StoppingPoint {
                                                         const std::function<void(double)>& progress);
 
 struct StoppingFit {
-  governor::StoppingModel model{};
+  StoppingModel model{};
   double mean_squared_relative{};  ///< Of model / measured - 1.
 };
 /// Least squares of the relative error.

@@ -22,6 +22,7 @@ Json json_of(const SweepPlan& p) {
   json["seeds"] = p.seeds;
   json["map"] = p.map;
   json["planner"] = p.planner;
+  json["vehicle"] = p.vehicle;
   json["settings"] = p.settings;
   json["shard"] = fmt::format("{}/{}", p.shard, p.shards);
   return json;
@@ -80,6 +81,7 @@ SweepPlan plan_from_json(const std::string& path, const std::string& text) {
     p.seeds = json.at("seeds").get<std::vector<std::uint64_t>>();
     p.map = json.at("map");
     p.planner = json.at("planner");
+    p.vehicle = json.value("vehicle", "");
     p.settings = json.at("settings");
     const std::string shard = json.at("shard");
     const bool whole = std::sscanf(shard.c_str(), "%d/%d", &p.shard, &p.shards) == 2 && p.shard >= 1 &&

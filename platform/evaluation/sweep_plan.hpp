@@ -32,6 +32,7 @@ struct SweepPlan {
   std::vector<std::uint64_t> seeds;
   std::string map{"own"};
   std::string planner{"own"};
+  std::string vehicle;   ///< Name and digest; empty in plans of before there were others.
   std::string settings;  ///< Digest of the settings file, or empty.
   int shard{1};          ///< 1 .. shards.
   int shards{1};

@@ -14,7 +14,8 @@
 
 namespace roborun::flight {
 
-/// Each minor frame: the flight lane may command(), then step() sends. Arms itself with the first command.
+/// Each minor frame: the flight lane may command(), then step() sends. Arms itself with the first command,
+/// without the proof that the kill switch works: for simulation and motors without propellers.
 /// RT-safe: O(1), no allocation.
 class ActuatorSide final : public firmware_if::Motors {
  public:

@@ -73,8 +73,9 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
                         config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
   motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W}, cloud_.points(), map_.view(), budget, work);
   out.motion = motion_.moving(in.now);
-  (void)profile_space({}, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W,
-                      relevant_W, r_m, out.profile, budget, work);
+  (void)profile_space({.vehicle_width_m = 2.0 * config_.vehicle.radius_m}, cloud_.points(), map_.view(),
+                      *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W, relevant_W, r_m, out.profile,
+                      budget, work);
   if (!sees_all) out.profile.obstacle_ahead_m = 0.0;
   out.profile.sensor_volume_m3 = cloud_.seen_volume_m3();
   // What the map will hold once this decision's images are in it.
@@ -151,7 +152,7 @@ void DecisionPipeline::check_committed(const DecisionInput& in, DecisionOutput& 
   core::Work& work = out.work[index(core::StageId::kPlanner)];
   const stages::PolledView polled(known, budget, work);
   const double from_s = seconds(in.now - in.committed->start_time);
-  const double until_s = free_until_s(polled, *in.committed, from_s, config_.vehicle_radius_m, work.units);
+  const double until_s = free_until_s(polled, *in.committed, from_s, config_.vehicle.radius_m, work.units);
   // Where something moves, what is fast now is not flown on until a slower plan is there.
   const bool too_fast = out.motion && in.v_WB.norm() > kTooFast * out.decision.point.speed_limit_mps;
   if (std::isinf(until_s) && !too_fast) return;
@@ -167,10 +168,9 @@ std::optional<Trajectory> DecisionPipeline::stop_before(const DecisionInput& in,
   const TrajectoryPoint then = in.committed->at(soonest);
   Trajectory stop;
   if (then.v_W.norm() <= kAtRest_mps ||
-      smoother_.brake(then, soonest, {config_.acceleration_mps2, config_.acceleration_mps2}, stop) !=
-          Status::kOk)
+      smoother_.brake(then, soonest, limits(config_.vehicle.acceleration_mps2), stop) != Status::kOk)
     return std::nullopt;
-  const double stop_free_s = free_until_s(known, stop, 0.0, config_.vehicle_radius_m, work.units);
+  const double stop_free_s = free_until_s(known, stop, 0.0, config_.vehicle.radius_m, work.units);
   if (!std::isinf(stop_free_s) && soonest + from_seconds(stop_free_s) < free_until) return std::nullopt;
   return stop;
 }
@@ -211,8 +211,8 @@ void DecisionPipeline::fit(core::StageBudget& budget, DecisionOutput& out) noexc
   request.path_W = {kept_W_.begin(), kept_W_.size()};
   request.start = draft_.start;
   request.start_time = draft_.takes_over;
-  request.limits = {out.decision.point.speed_limit_mps, config_.acceleration_mps2};
-  request.radius_m = out.planner_status == Status::kStartBlocked ? config_.vehicle_radius_m : radius_m();
+  request.limits = limits(out.decision.point.speed_limit_mps);
+  request.radius_m = out.planner_status == Status::kStartBlocked ? config_.vehicle.radius_m : radius_m();
   meter_.charge_to(core::StageId::kSmoother);
   stages::SmoothResult smoothed;
   out.smoother_status = smoother_.smooth(request, view, budget, smoothed);
@@ -232,7 +232,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   const stages::FencedView fenced(map_.view(), config_.fence);
   const stages::FinestView known(config_.fence.empty() ? map_.view() : fenced);
   draft_.committed_until_s = free_until_s(known, *in.committed, seconds(in.now - in.committed->start_time),
-                                          config_.vehicle_radius_m, draft_.planner_work.units);
+                                          config_.vehicle.radius_m, draft_.planner_work.units);
   draft_.planner_work.level = out.decision.point.p1_level;
   draft_.planner_budget.emplace(budget_of(core::StageId::kPlanner, out));
   search(in, kCornerRoom_m, out);

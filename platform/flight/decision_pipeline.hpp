@@ -14,6 +14,7 @@
 #include "core/memory/static_vector.hpp"
 #include "core/sensor_rig.hpp"
 #include "core/trajectory.hpp"
+#include "core/vehicle_model.hpp"
 #include "governor/policy/governor.hpp"
 #include "platform/flight/motion_watch.hpp"
 #include "stages/perception/cloud_images.hpp"
@@ -26,17 +27,14 @@
 namespace roborun::flight {
 
 struct PipelineConfig {
-  Aabb flight_bounds_W{};        ///< The vehicle's centre stays inside.
-  double vehicle_radius_m{0.6};  ///< Half of the 1.2 m span. [0.1, 2]
-  /// Added to the radius for planning: the tracking error (tests/platform/sitl/vehicle/closed_loop_test.cpp).
-  double inflation_m{0.3};
+  Aabb flight_bounds_W{};  ///< The vehicle's centre stays inside.
+  VehicleModel vehicle{};
   std::size_t images{6};  ///< Of all sensors: what fewer images do not show may be anything.
   /// The sensors together see every direction; false: what they do not see may be anything.
   bool sees_all_around{true};
   double level_view_ratio{1.0};  ///< FlightConfig::level_view_ratio.
   double horizon_m{24.0};        ///< No way-point farther than this: one metre less than the cameras see.
-  double acceleration_mps2{4.0};
-  core::Fence fence{};                   ///< What it forbids is occupied for planner and smoother.
+  core::Fence fence{};           ///< What it forbids is occupied for planner and smoother.
   Nanos minor_frame{core::kMinorFrame};  ///< Of the flight lane: no stop takes over sooner.
   Aabb map_bounds_W{};  ///< What the map stores; its heights limit what counts as seen volume.
 };
@@ -98,9 +96,14 @@ class DecisionPipeline {
   [[nodiscard]] const stages::MapView& view() const noexcept { return map_.view(); }
   [[nodiscard]] const stages::OccupancyMap& map() const noexcept { return map_; }
   /// What plans keep free around the vehicle.
-  [[nodiscard]] double radius_m() const noexcept { return config_.vehicle_radius_m + config_.inflation_m; }
+  [[nodiscard]] double radius_m() const noexcept { return planned_radius_m(config_.vehicle); }
 
  private:
+  /// The vehicle's limits, at this speed.
+  [[nodiscard]] stages::MotionLimits limits(double speed_mps) const noexcept {
+    const VehicleModel& v = config_.vehicle;
+    return {speed_mps, v.acceleration_mps2, v.jerk_mps3, v.climb_mps, v.descent_mps};
+  }
   /// What the planner's slot leaves to the smoother's.
   struct Draft {
     bool begun{};  ///< False: nothing is planned in this decision.

@@ -1,5 +1,7 @@
 #include "platform/flight/failsafe_pilot.hpp"
 
+#include <algorithm>
+
 #include "core/geometry/math.hpp"
 
 namespace roborun::flight {
@@ -9,7 +11,8 @@ using governor::Phase;
 
 namespace {
 
-constexpr double kLostTilt_cos = 0.5;  // 60 degrees
+constexpr double kLostTilt_rad = 1.0472;  // 60 degrees ...
+constexpr double kBeyondLimit_rad = 0.3;  // ... or so much more than the controller ever asks for
 constexpr double kHome_m = 1.0;
 constexpr double kAtSite_m = 0.7;
 constexpr double kDescent_mps = 1.0;
@@ -18,6 +21,12 @@ constexpr Nanos kSitePatience{10'000'000'000};   // until it comes down blindly 
 constexpr Nanos kStandPatience{20'000'000'000};  // ... also if it cannot stand still
 
 }  // namespace
+
+FailsafePilot::FailsafePilot(const Config& config, FlightControl& control, Aircraft& aircraft) noexcept
+    : config_(config),
+      lost_tilt_cos_(core::sin_cos(std::max(kLostTilt_rad, config.vehicle.tilt_rad + kBeyondLimit_rad)).cos),
+      control_(control),
+      aircraft_(aircraft) {}
 
 FailsafeMeasures FailsafePilot::measure(MonotonicTime now, const DecisionReport& d) noexcept {
   FailsafeMeasures m;
@@ -36,9 +45,11 @@ FailsafeMeasures FailsafePilot::measure(MonotonicTime now, const DecisionReport&
   }
   stages::EstimatedState state;
   if (control_.estimator().state(state) != Status::kOk) return m;
-  const bool tilted = state.q_WB.toRotationMatrix()(2, 2) < kLostTilt_cos;
+  const bool tilted = state.q_WB.toRotationMatrix()(2, 2) < lost_tilt_cos_;
   m.control_lost = tilted || control_.imu_lost(now) ? 1.0 : 0.0;
-  if (control_.flying()) m.tracking_error_m = (state.p_WB - control_.reference().p_W).norm();
+  if (control_.flying())
+    m.tracking_error_ratio =
+        (state.p_WB - control_.reference().p_W).norm() / planned_radius_m(config_.vehicle);
   // Heights only between climb and descent: both go through the floor.
   const bool low = !control_.airborne() || control_.descending();
   const bool inside =
@@ -52,7 +63,7 @@ void FailsafePilot::guard(MonotonicTime now, const DecisionReport& decision) noe
   if (phase_ == Phase::kTakeOff && control_.airborne()) phase_ = Phase::kMission;
   if (control_.landed()) return aircraft_.disarm();
   FailsafeMeasures measures = measure(now, decision);
-  if (control_.descending()) measures.tracking_error_m = 0.0;  // the ground stops it, and is meant to
+  if (control_.descending()) measures.tracking_error_ratio = 0.0;  // the ground stops it, and is meant to
   conditions_ = monitor_.step(now, measures);
   const Action wanted = governor::arbitrate(conditions_, phase_);
   if (!config_.answers) return;

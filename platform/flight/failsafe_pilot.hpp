@@ -5,6 +5,7 @@
 
 #include "core/geometry/fence.hpp"
 #include "core/memory/static_vector.hpp"
+#include "core/vehicle_model.hpp"
 #include "governor/failsafe/arbiter.hpp"
 #include "platform/flight/aircraft.hpp"
 #include "platform/flight/failsafe_monitor.hpp"
@@ -25,11 +26,11 @@ struct FailsafeEvent {
 class FailsafePilot {
  public:
   struct Config {
+    VehicleModel vehicle{};
     core::Fence fence{};
     bool answers{true};  ///< False: conditions are seen and recorded, and nothing is done. For tests alone.
   };
-  FailsafePilot(const Config& config, FlightControl& control, Aircraft& aircraft) noexcept
-      : config_(config), control_(control), aircraft_(aircraft) {}
+  FailsafePilot(const Config& config, FlightControl& control, Aircraft& aircraft) noexcept;
 
   /// Judges one minor frame: `decision` is the newest report of the decision lane.
   void guard(MonotonicTime now, const DecisionReport& decision) noexcept;
@@ -51,6 +52,7 @@ class FailsafePilot {
   void land(MonotonicTime now, const DecisionReport& decision) noexcept;
 
   Config config_;
+  double lost_tilt_cos_;  ///< Tilted by more, the control loop has lost the vehicle.
   FlightControl& control_;
   Aircraft& aircraft_;
   FailsafeMonitor monitor_;

@@ -49,7 +49,5 @@ struct FlightConfig {
 [[nodiscard]] Aabb map_bounds_W(const FlightConfig& config) noexcept;
 /// What a rig says of a flight: range, what is seen, the size of clouds.
 void describe_sensors(const SensorRig& rig, FlightConfig& config) noexcept;
-/// Distance that plans keep from everything: the vehicle's radius and its tracking error.
-[[nodiscard]] double planned_radius_m(const FlightConfig& config) noexcept;
 
 }  // namespace roborun::flight

@@ -12,7 +12,7 @@ constexpr Nanos kSettle{1'000'000'000};     // the filter's biases need a second
 constexpr Nanos kHover{300'000'000};        // at the top, before the first decision
 constexpr double kGyroRange_radps = 35.0;   // 2,000 degrees a second
 constexpr double kAccelRange_mps2 = 157.0;  // 16 g
-constexpr double kBrake_mps2 = 2.5;         // with the path's own 4 m/s2 still within the tilt limit
+constexpr double kBrakeShare = 0.625;  // of the limit of acceleration: besides what the path itself needs
 constexpr double kTakeOff_mps = 1.5;
 constexpr double kStand_m = 0.5;
 constexpr double kStand_mps = 0.3;
@@ -22,11 +22,11 @@ constexpr double kBelowGround_m = 20.0;  // the reference goes on until the vehi
 constexpr Nanos kLanded{1'000'000'000};
 
 /// Straight up from the ground to the height of the first hover.
-Trajectory take_off(const Vector3& ground_W, double cruise_m, MonotonicTime start) {
+Trajectory take_off(const Vector3& ground_W, double cruise_m, double speed_mps, MonotonicTime start) {
   Trajectory t;
   t.start_time = start;
   (void)stages::append_rest_to_rest(ground_W, Vector3(ground_W.x(), ground_W.y(), cruise_m),
-                                    {kTakeOff_mps, kTakeOff_mps}, t);
+                                    {speed_mps, speed_mps}, t);
   return t;
 }
 
@@ -74,7 +74,7 @@ void FlightControl::commit(MonotonicTime now) {
   }
   if (!flying_) {
     if (now - *first_estimate_ < kSettle || !may_take_off_) return;
-    committed_ = take_off(state.p_WB, cruise_m_, now);
+    committed_ = take_off(state.p_WB, cruise_m_, std::min(kTakeOff_mps, vehicle_.climb_mps), now);
     ++committed_number_;
     flying_ = true;
     home_W_ = committed_.end_W();
@@ -109,6 +109,7 @@ bool FlightControl::standing(MonotonicTime now) const {
 void FlightControl::descend(MonotonicTime now, double speed_mps) {
   if (descending_ || !flying_) return;
   const Vector3 from_W = committed_.at(now).p_W;
+  speed_mps = std::min(speed_mps, vehicle_.descent_mps);
   const double fast_m = std::max(from_W.z() - ground_m_ - kNearGround_m, 0.0);
   const auto straight_down = [](const Vector3& at_W, double length_m, double rate_mps) {
     PolynomialSegment segment;
@@ -135,9 +136,13 @@ TrajectoryPoint FlightControl::next_reference(MonotonicTime now) {
   if (!braking_) return committed_.at(now);
   // The same curve at a rate that falls to zero: p = c(s), v = c' s', a = c'' s'^2 + c' s''.
   if (brake_at_s_ < 0.0) brake_at_s_ = seconds(now - committed_.start_time) - period_s_;
+  // What the path needs and what braking needs together stay within the tilt limit.
+  const double brake_mps2 =
+      std::min(kBrakeShare * vehicle_.acceleration_mps2,
+               std::max(tilt_acceleration_mps2(vehicle_) - vehicle_.acceleration_mps2, 0.5));
   const double rate = brake_rate_;
   const double speed_mps = committed_.at_s(brake_at_s_).v_W.norm();
-  brake_rate_ = std::max(rate - period_s_ * kBrake_mps2 / std::max(speed_mps, 1.0), 0.0);
+  brake_rate_ = std::max(rate - period_s_ * brake_mps2 / std::max(speed_mps, 1.0), 0.0);
   brake_at_s_ += period_s_ * brake_rate_;
   TrajectoryPoint point = committed_.at_s(brake_at_s_);
   if (brake_rate_ <= 0.0 || brake_at_s_ >= committed_.duration_s()) {
@@ -159,11 +164,10 @@ void FlightControl::watch_touchdown(MonotonicTime now, const stages::EstimatedSt
   constexpr double kBelow_m = 0.3;
   constexpr double kCarried_ratio = 0.8;
   double thrust_N = 0.0;
-  const stages::Airframe airframe;
-  for (const double ratio : command_.thrust_ratio) thrust_N += ratio * airframe.max_thrust_N;
+  for (const double ratio : command_.thrust_ratio) thrust_N += ratio * vehicle_.max_thrust_N;
   const bool still = std::fabs(state.v_WB.z()) < kStill_mps;
   const bool pushed = reference_.p_W.z() < state.p_WB.z() - kBelow_m;
-  const bool carried = thrust_N < kCarried_ratio * airframe.mass_kg * 9.81;
+  const bool carried = thrust_N < kCarried_ratio * vehicle_.mass_kg * 9.81;
   if (!(still && pushed && carried)) moving_ = now;
   landed_ = now - moving_ >= kLanded;
 }

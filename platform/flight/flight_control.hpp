@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "core/trajectory.hpp"
+#include "core/vehicle_model.hpp"
 #include "firmware_if/barometer.hpp"
 #include "firmware_if/gnss.hpp"
 #include "firmware_if/imu.hpp"
@@ -17,12 +18,13 @@ namespace roborun::flight {
 
 class FlightControl {
  public:
-  FlightControl(const stages::Estimator::Config& estimator, const stages::Tracker::Config& tracker,
-                const GazeConfig& gaze = {})
-      : estimator_(estimator),
-        tracker_(tracker),
-        period_s_(tracker.period_s),
-        gaze_(gaze, tracker.period_s) {}
+  /// `period_s` is the minor frame.
+  FlightControl(const VehicleModel& vehicle, double period_s, const GazeConfig& gaze = {})
+      : vehicle_(vehicle),
+        estimator_({}),
+        tracker_(stages::Tracker::config_for(vehicle, period_s)),
+        period_s_(period_s),
+        gaze_(gaze, period_s) {}
 
   /// Straight up to the height of the first hover, flown as soon as the estimator has settled.
   void set_cruise_height(double cruise_m) { cruise_m_ = cruise_m; }
@@ -82,6 +84,7 @@ class FlightControl {
   [[nodiscard]] TrajectoryPoint next_reference(MonotonicTime now);
   void watch_touchdown(MonotonicTime now, const stages::EstimatedState& state);
 
+  VehicleModel vehicle_;
   stages::Estimator estimator_;
   stages::Tracker tracker_;
   double period_s_;  ///< The minor frame.

@@ -10,9 +10,7 @@ constexpr double kMapMargin_m = 3.0;
 PipelineConfig pipeline_config(const FlightConfig& config, std::size_t cameras, std::size_t lidars) noexcept {
   PipelineConfig pipeline;
   pipeline.flight_bounds_W = config.bounds_W;
-  pipeline.vehicle_radius_m = config.vehicle.radius_m;
-  pipeline.inflation_m = config.vehicle.tracking_error_m;
-  pipeline.acceleration_mps2 = config.vehicle.acceleration_mps2;
+  pipeline.vehicle = config.vehicle;
   pipeline.map_bounds_W = map_bounds_W(config);
   pipeline.images = cameras + lidars * stages::CloudImages::kImages;
   pipeline.level_view_ratio = config.level_view_ratio;
@@ -33,6 +31,7 @@ governor::GovernorConfig governor_config(const FlightConfig& config) noexcept {
   g.smoother_s = cost_of(core::StageId::kSmoother);
   g.v_max_mps = config.vehicle.speed_mps;
   g.vehicle_width_m = 2.0 * config.vehicle.radius_m;
+  g.stopping = stopping_model(config.vehicle);
   const double range_m = config.camera_range_m;
   const double height_m = map_bounds_W(config).size().z();
   g.sensor_volume_max_m3 = 4.0 * range_m * range_m * std::min(height_m, 2.0 * range_m);
@@ -46,10 +45,6 @@ governor::GovernorConfig governor_config(const FlightConfig& config) noexcept {
 Aabb map_bounds_W(const FlightConfig& config) noexcept {
   const Vector3 margin = Vector3::Constant(kMapMargin_m);
   return {config.bounds_W.min_W - margin, config.bounds_W.max_W + margin};
-}
-
-double planned_radius_m(const FlightConfig& config) noexcept {
-  return config.vehicle.radius_m + config.vehicle.tracking_error_m;
 }
 
 void describe_sensors(const SensorRig& rig, FlightConfig& config) noexcept {
@@ -76,8 +71,8 @@ FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, 
       governor_(governor_config(config)),
       pipeline_(pipeline_config(config, cameras.size(), lidars.size()), meter, governor_, cloud_, parts.map,
                 parts.planner, smoother_),
-      control_({}, {.period_s = seconds(config.minor_frame)}, config.gaze),
-      flight_program_({config.fence, config.answers}, control_, aircraft, mail_),
+      control_(config.vehicle, seconds(config.minor_frame), config.gaze),
+      flight_program_({config.vehicle, config.fence, config.answers}, control_, aircraft, mail_),
       decision_program_({config.goal_W, config.seed, config.fence, config.minor_frame}, pipeline_, cameras,
                         mail_, lidars, config.cloud_pixels, arena) {
   control_.set_cruise_height(config.cruise_m);

@@ -55,6 +55,13 @@ class TomlReader {
     }
     return *value;
   }
+  /// Within [low, high].
+  double number(const toml::node& node, std::string_view key, double low, double high) const {
+    const auto value = node.is_integer() || node.is_floating_point() ? node.value<double>() : std::nullopt;
+    if (!value || !(*value >= low && *value <= high))
+      refuse(node, key, fmt::format("must be a number from {} to {}", low, high));
+    return *value;
+  }
   double number_or(const toml::table& table, std::string_view key, double fallback) const {
     const toml::node* node = table.get(key);
     return node == nullptr ? fallback : number(*node, key);

@@ -168,7 +168,7 @@ RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
       motor_bus_(motor_bus_of(config, clock_)),
       kill_lines_(config.kill ? std::make_unique<gpio::KernelKillLines>(*config.kill) : nullptr),
       cameras_(world, config.mission.simulator, config.mission.seed),
-      aircraft_(config.mission.simulator, ground_below(world), config.mission.seed,
+      aircraft_(flight_config_.vehicle, config.mission.simulator, ground_below(world), config.mission.seed,
                 flight_config_.minor_frame, cameras_, outside(motor_bus_.get(), kill_lines_.get())),
       start_W_(aircraft_.vehicle().state().p_WB),
       setup_(flight_config_, config.mission.backends, image_limits(config.mission)),
@@ -363,8 +363,8 @@ std::vector<report::PoolUse> memory_plan_of(const sitl::World& world, const Miss
   const flight::FlightConfig flight = flight_config_of(world, config);
   FlightSetup setup(flight, config.backends, image_limits(config));
   sitl::CameraRig rig(world, config.simulator, config.seed);
-  sitl::SimulatedAircraft aircraft(config.simulator, ground_below(world), config.seed, flight.minor_frame,
-                                   rig);
+  sitl::SimulatedAircraft aircraft(flight.vehicle, config.simulator, ground_below(world), config.seed,
+                                   flight.minor_frame, rig);
   core::ClockMeter meter;
   const auto system = std::make_unique<flight::FlightSystem>(flight, meter, aircraft, rig.cameras(),
                                                              setup.parts(), setup.arena(), rig.lidars());

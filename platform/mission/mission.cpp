@@ -29,7 +29,7 @@ double quantile(std::vector<double> values, double q) {
 
 /// Start and goal must be inside the fence, with room.
 const MissionConfig& checked(const sitl::World& world, const MissionConfig& config) {
-  const double room_m = planned_radius_m(config.flight);
+  const double room_m = planned_radius_m(config.flight.vehicle);
   for (const auto& [name, p_W] : {std::pair{"start", world.start_W()}, std::pair{"goal", world.goal_W()}}) {
     if (!config.flight.fence.allows(Aabb::around(p_W, room_m)))
       throw InputError(
@@ -76,7 +76,8 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
       flight_config_(flight_config_of(world, config)),
       faults_(config),
       rig_(world, config.simulator, config.seed),
-      aircraft_(config.simulator, ground_below(world), config.seed, config.flight.minor_frame, rig_),
+      aircraft_(flight_config_.vehicle, config.simulator, ground_below(world), config.seed,
+                config.flight.minor_frame, rig_),
       cameras_(faults_.connect(rig_.cameras())),
       recorder_(config.record.empty()
                     ? nullptr

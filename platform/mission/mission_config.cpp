@@ -30,10 +30,14 @@ flight::FlightConfig flight_config_of(const sitl::World& world, const MissionCon
   return flight;
 }
 
+void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle) {
+  config.flight.vehicle = vehicle.model;
+}
+
 Vector3 ground_below(const sitl::World& world) { return {world.start_W().x(), world.start_W().y(), 0.0}; }
 
 board::ImageLimits image_limits(const MissionConfig& config) {
-  return board::image_limits(sitl::rig_of(config.simulator));
+  return board::image_limits(sitl::rig_of(config.simulator), config.flight.vehicle);
 }
 
 }  // namespace roborun::mission

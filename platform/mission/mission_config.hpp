@@ -13,6 +13,7 @@
 #include "platform/sitl/aircraft/simulated_aircraft.hpp"
 #include "platform/sitl/fault/fault_line.hpp"
 #include "platform/sitl/world/world.hpp"
+#include "platform/vehicle/vehicle_file.hpp"
 
 namespace roborun::mission {
 
@@ -64,6 +65,8 @@ struct MissionConfig {
 /// The flight through `world`: its bounds, its goal, the height of its start, and the rest from `config`.
 /// Throws InputError for a rig that cannot be.
 [[nodiscard]] flight::FlightConfig flight_config_of(const sitl::World& world, const MissionConfig& config);
+/// This vehicle flies the mission.
+void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle);
 /// Where the vehicle stands before the flight.
 [[nodiscard]] Vector3 ground_below(const sitl::World& world);
 /// Of the images that the map will get.

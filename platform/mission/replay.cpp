@@ -211,7 +211,8 @@ ReplayResult replay_flight(const std::string& path, const std::function<void(dou
   for (std::uint32_t i = 0; i < recorded.lidar_mounts.size(); ++i) lidar.emplace_back(recording, i);
   std::vector<firmware_if::Lidar*> lidars;
   for (ReplayedLidar& l : lidar) lidars.push_back(&l);
-  FlightSetup setup(recorded.flight, recorded.backends, board::image_limits(recorded.sensors));
+  FlightSetup setup(recorded.flight, recorded.backends,
+                    board::image_limits(recorded.sensors, recorded.flight.vehicle));
   const auto flight = std::make_unique<flight::LockstepFlight>(recorded.flight, aircraft, cameras,
                                                                setup.parts(), setup.arena(), lidars);
   setup.check();

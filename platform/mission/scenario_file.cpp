@@ -83,8 +83,9 @@ std::array<const char*, N> names_of() {
 
 void ScenarioReader::read_head(Scenario& s) const {
   const toml::table& head = table("scenario");
-  reader_.allow_keys(head, "[scenario]",
-                     {"about", "world", "environment", "seed", "design", "answers", "cost_factor"});
+  reader_.allow_keys(
+      head, "[scenario]",
+      {"about", "world", "environment", "vehicle", "seed", "design", "answers", "cost_factor"});
   s.about = text(reader_.need(head, "about", "[scenario]"), "about");
   const toml::node* world = head.get("world");
   const toml::node* environment = head.get("environment");
@@ -93,6 +94,13 @@ void ScenarioReader::read_head(Scenario& s) const {
   if (world != nullptr)
     s.world = (std::filesystem::path(path_).parent_path() / text(*world, "world")).string();
   if (environment != nullptr) s.environment = text(*environment, "environment");
+  if (const toml::node* node = head.get("vehicle")) {
+    const std::string name = text(*node, "vehicle");
+    const std::vector<std::string> shipped = vehicle::shipped_vehicles();
+    const bool ships = std::find(shipped.begin(), shipped.end(), name) != shipped.end();
+    set_vehicle(s.config, vehicle::load_vehicle(
+                              ships ? name : (std::filesystem::path(path_).parent_path() / name).string()));
+  }
   if (const toml::node* node = head.get("seed")) {
     const double seed = number(*node, "seed", 0, 20000);
     s.config.seed = static_cast<std::uint64_t>(seed);

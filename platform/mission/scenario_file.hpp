@@ -33,7 +33,8 @@ struct Scenario {
   Expectation expect{};
 };
 
-/// Tables [scenario] about, world (relative to this file) or environment, seed, design, answers, cost_factor
+/// Tables [scenario] about, world (relative to this file) or environment, vehicle (shipped, or a file
+/// relative to this one), seed, design, answers, cost_factor
 /// (of computing, against the paper's machine); those of a
 /// settings file (settings_file.hpp); any number of [[fault]] with component, kind, instance, phase, at_s,
 /// for_s; [[body]] as in a world file (body_reader.hpp); [expect] with the fields above. Throws

@@ -128,7 +128,7 @@ void read_settings(const input::TomlReader& reader, const toml::table& root, Mis
     read(reader, *t, "gust_mps", {0, 10}, config.simulator.wind.gust_mps);
   }
   if (const toml::table* t = section(reader, root, "battery", {"capacity_J"}))
-    read(reader, *t, "capacity_J", {1e3, 1e9}, config.simulator.vehicle.battery_J);
+    read(reader, *t, "capacity_J", {1e3, 1e9}, config.flight.vehicle.battery_J);
   if (const toml::table* t = section(reader, root, "flight", {"v_max_mps", "time_limit_s"})) {
     read(reader, *t, "v_max_mps", {0.5, 12}, config.flight.vehicle.speed_mps);
     read(reader, *t, "time_limit_s", {1, 100000}, config.judge.time_limit_s);

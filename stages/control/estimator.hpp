@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "core/geometry/vector.hpp"
+#include "firmware_if/assert.hpp"
 #include "firmware_if/barometer.hpp"
 #include "firmware_if/gnss.hpp"
 #include "firmware_if/imu.hpp"
@@ -53,7 +54,10 @@ class Estimator {
     std::uint64_t resets{};  ///< A NaN got inside: started again from the next fix.
   };
 
-  explicit Estimator(const Config& config) noexcept : config_(config), past_(config.oldest_fix) {}
+  /// Precondition, asserted: config.validate() is kOk.
+  explicit Estimator(const Config& config) noexcept : config_(config), past_(config.oldest_fix) {
+    ROBORUN_ASSERT(config.validate() == Status::kOk);
+  }
 
   /// One IMU sample, in order. Refused (kInvalidArgument, kStale) if not finite or not newer than the one
   /// before. RT-safe: O(1), about 2 us, every fourth call 5 us more for the covariance.

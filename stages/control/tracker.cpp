@@ -15,6 +15,22 @@ Vector3 clamp_norm(const Vector3& v, double limit) noexcept {
 
 }  // namespace
 
+Tracker::Config Tracker::config_for(const VehicleModel& vehicle, double period_s) noexcept {
+  constexpr double kTunedLag_s = 0.040;
+  const double quicker = std::clamp(kTunedLag_s / vehicle.motor_lag_s, 0.4, 2.5);
+  Config config;
+  config.vehicle = vehicle;
+  config.position_gain_Hz *= quicker;
+  config.velocity_gain_Hz *= quicker;
+  config.velocity_integral_Hz2 *= quicker * quicker;
+  config.attitude_gain_Hz *= quicker;
+  config.rate_gain_Hz *= quicker;
+  config.integral_limit_mps2 =
+      std::clamp(1.2 * drag_mps2(vehicle, vehicle.speed_mps), config.integral_limit_mps2, 10.0);
+  config.period_s = period_s;
+  return config;
+}
+
 Vector3 Tracker::acceleration_W(const Input& in) noexcept {
   const Vector3 correction =
       clamp_norm(config_.position_gain_Hz * (in.reference.p_W - in.state.p_WB), config_.correction_limit_mps);
@@ -25,7 +41,7 @@ Vector3 Tracker::acceleration_W(const Input& in) noexcept {
   Vector3 a_W = in.reference.a_W + config_.velocity_gain_Hz * error_W_mps + integral_W_mps2_;
   // Never ask for less than half of hover thrust: attitude needs something to work with.
   a_W.z() = std::clamp(a_W.z(), -0.5 * core::kGravity_mps2, 0.6 * core::kGravity_mps2);
-  const core::SinCos tilt = core::sin_cos(config_.tilt_limit_rad);
+  const core::SinCos tilt = core::sin_cos(config_.vehicle.tilt_rad);
   const double side_limit = (core::kGravity_mps2 + a_W.z()) * tilt.sin / tilt.cos;
   const double side = core::hypot2(a_W.x(), a_W.y());
   if (side > side_limit) {
@@ -46,7 +62,8 @@ Status Tracker::step(const Input& in, firmware_if::MotorCommand& out) noexcept {
     return Status::kInvalidArgument;
   }
   ++counters_.steps;
-  const Airframe& airframe = config_.airframe;
+  const VehicleModel& vehicle = config_.vehicle;
+  const Vector3 inertia_kgm2 = vehicle.inertia_kgm2();
   const Vector3 force_W = acceleration_W(in) + Vector3(0.0, 0.0, core::kGravity_mps2);
   const Matrix3 R_WB = in.state.q_WB.toRotationMatrix();
 
@@ -66,12 +83,11 @@ Status Tracker::step(const Input& in, firmware_if::MotorCommand& out) noexcept {
   const Vector3 feed_B(-turn_W.dot(R_WB.col(1)), turn_W.dot(R_WB.col(0)), 0.0);
   const Vector3 rate_B = feed_B - config_.attitude_gain_Hz * error_B.cwiseProduct(Vector3(1.0, 1.0, 0.4));
 
-  const Vector3 momentum = airframe.inertia_kgm2.cwiseProduct(in.state.w_WB_B);
-  const Vector3 torque_B =
-      config_.rate_gain_Hz * airframe.inertia_kgm2.cwiseProduct(rate_B - in.state.w_WB_B) +
-      in.state.w_WB_B.cross(momentum);
-  const double thrust_N = airframe.mass_kg * std::max(force_W.dot(R_WB.col(2)), 0.0);
-  out = mix(airframe, thrust_N, torque_B);
+  const Vector3 momentum = inertia_kgm2.cwiseProduct(in.state.w_WB_B);
+  const Vector3 torque_B = config_.rate_gain_Hz * inertia_kgm2.cwiseProduct(rate_B - in.state.w_WB_B) +
+                           in.state.w_WB_B.cross(momentum);
+  const double thrust_N = vehicle.mass_kg * std::max(force_W.dot(R_WB.col(2)), 0.0);
+  out = mix(vehicle, thrust_N, torque_B);
   return Status::kOk;
 }
 

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/range.hpp"
 #include "core/record/state_hash.hpp"
+#include "firmware_if/assert.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -40,11 +42,12 @@ Status BrickMap::Config::validate() const noexcept {
   if (!bounds_ok) return Status::kInvalidArgument;
   const double positions = 8.0 * std::ceil(size.x() / kCoarsest_m + 1) *
                            std::ceil(size.y() / kCoarsest_m + 1) * std::ceil(size.z() / kCoarsest_m + 1);
-  const bool ok = positions <= kMaxPositions && max_bricks >= 64 && max_bricks <= 200000 && max_frames >= 1 &&
-                  max_frames <= 8 && all_around_frames <= max_frames && max_image_width >= 8 &&
-                  max_image_width <= kMaxImageSide && max_image_height >= 8 &&
-                  max_image_height <= kMaxImageSide && vehicle_radius_m >= 0.0 && vehicle_radius_m <= 2.0 &&
-                  depth_margin_m >= 0.0 && depth_margin_quadratic_per_m >= 0.0;
+  const bool ok = positions <= kMaxPositions && core::within<std::size_t>(max_bricks, 64, 200000) &&
+                  core::within<std::size_t>(max_frames, 1, kMaxCameras) && all_around_frames <= max_frames &&
+                  core::within<std::size_t>(max_image_width, 8, kMaxImageSide) &&
+                  core::within<std::size_t>(max_image_height, 8, kMaxImageSide) &&
+                  core::within(vehicle_radius_m, 0.0, 2.0) && core::within(depth_margin_m, 0.0, 10.0) &&
+                  core::within(depth_margin_quadratic_per_m, 0.0, 1.0);
   return ok ? Status::kOk : Status::kInvalidArgument;
 }
 
@@ -57,7 +60,8 @@ std::size_t BrickMap::arena_bytes(const Config& config) noexcept {
 }
 
 BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
-    : config_(config),
+    // Before the bounds become whole numbers.
+    : config_((ROBORUN_ASSERT(config.validate() == Status::kOk), config)),
       corner_W_(corner_of(config.bounds_W)),
       nx_(even_bricks(config.bounds_W.max_W.x() - corner_W_.x())),
       ny_(even_bricks(config.bounds_W.max_W.y() - corner_W_.y())),

@@ -18,6 +18,7 @@
 #include <span>
 
 #include "core/memory/arena.hpp"
+#include "core/vehicle_model.hpp"
 #include "stages/perception/block_sight.hpp"
 #include "stages/perception/brick.hpp"
 #include "stages/perception/cloud_images.hpp"
@@ -36,13 +37,14 @@ class BrickMap final : public OccupancyMap, private MapView {
     std::size_t max_bricks{9100};  ///< 1,000,000 m3 at 0.3 m. [64, 200000]
     std::size_t max_frames{6};     ///< Of one scan. [1, 8]
     /// So many images of cameras together see every direction: then what lies between two of them is seen, too.
-    /// 0: the cameras do not see all around. (The images of a cloud do.)
+    /// 0: the cameras do not see all around. (The images of a cloud do.) [0, max_frames]
     std::size_t all_around_frames{6};
     std::size_t max_image_width{512};   ///< Pixels, of the largest image. [8, 1280]
     std::size_t max_image_height{512};  ///< Pixels, of the largest image. [8, 1280]
-    double vehicle_radius_m{0.6};       ///< Where the vehicle is, nothing else is: free. [0, 2]
-    double depth_margin_m{0.05};        ///< A cell is free only if every pixel sees this much past it ...
-    /// ... plus this times depth squared, in metres: three sigma of a stereo camera. 1/m, >= 0.
+    double vehicle_radius_m{
+        VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is: free. [0, 2]
+    double depth_margin_m{0.05};   ///< A cell is free only if every pixel sees this much past it [0, 10] ...
+    /// ... plus this times depth squared, in metres: three sigma of a stereo camera. [0, 1]
     double depth_margin_quadratic_per_m{0.0012};
     /// kInvalidArgument if a number is out of range, or the bounds hold more than 4 million bricks.
     [[nodiscard]] Status validate() const noexcept;
@@ -54,7 +56,7 @@ class BrickMap final : public OccupancyMap, private MapView {
 
   /// Bytes that the constructor takes from the arena.
   [[nodiscard]] static std::size_t arena_bytes(const Config& config) noexcept;
-  /// Precondition: config.validate() is kOk and the arena has arena_bytes(). Check arena.exhausted()
+  /// Preconditions: config.validate() is kOk, asserted, and the arena has arena_bytes(). Check arena.exhausted()
   /// afterwards.
   BrickMap(const Config& config, core::Arena& arena) noexcept;
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "firmware_if/assert.hpp"
 #include "stages/perception/depth_steps.hpp"
 
 namespace roborun::stages {
@@ -32,7 +33,9 @@ std::size_t view_of(const std::array<float, 3>& p) noexcept {
 }  // namespace
 
 CloudImages::CloudImages(const Config& config, core::Arena& arena) noexcept
-    : config_(config), depth_m_(arena.take<float>(kImages * config.pixels * config.pixels, "cloud images")) {}
+    : config_(config), depth_m_(arena.take<float>(kImages * config.pixels * config.pixels, "cloud images")) {
+  ROBORUN_ASSERT(config.validate() == Status::kOk);
+}
 
 Status CloudImages::make(const PosedCloud& cloud) noexcept {
   count_ = 0;

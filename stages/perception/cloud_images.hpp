@@ -42,7 +42,7 @@ class CloudImages {
   [[nodiscard]] static constexpr std::size_t arena_bytes(const Config& config) noexcept {
     return kImages * config.pixels * config.pixels * sizeof(float) + alignof(std::max_align_t);
   }
-  /// Precondition: config.validate() is kOk. Check arena.exhausted() afterwards.
+  /// Precondition, asserted: config.validate() is kOk. Check arena.exhausted() afterwards.
   CloudImages(const Config& config, core::Arena& arena) noexcept;
 
   /// Each pixel takes the nearest of its points; a pixel without one has no information: where no point came

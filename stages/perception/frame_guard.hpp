@@ -24,12 +24,10 @@ inline constexpr double kLeastInformedRatio = 0.6;
 
 /// check_frame(), and what only the frames before can tell:
 ///  - stamps: a frame more than kStampSpread from the middle one of its scan, or a scan that much older than
-///  the
-///    one before it, is refused. (Twice as old in a row is believed: the clock was set.)
+///    the one before it, is refused. (Twice as old in a row is believed: the clock was set.)
 ///  - frozen: 64 pixels spread over the image, 8 of them or more showing a surface, that are bit-equal to
-///  those
-///    of a remembered frame of another stamp. Noise makes that impossible. An image without surfaces may
-///    repeat.
+///    those of a remembered frame of another stamp. Noise makes that impossible. An image without surfaces
+///    may repeat.
 /// White, "nothing within the range" everywhere, is what an open sky looks like: BrickMap refuses it where it
 /// knows of a surface.
 class FrameGuard {

@@ -25,8 +25,8 @@ struct IntegrationRequest {
   std::span<const PosedDepthFrame> frames{};  ///< Those of a cloud in a request of their own.
   int level{0};                               ///< p0: no cell finer than cell_size_m(level) is written.
   double volume_m3{0.0};  ///< v0: space nearest to `trajectory_W` first, until this is spent.
-  std::span<const Vector3>
-      trajectory_W{};  ///< Points of the committed trajectory; at least the vehicle itself.
+  /// Points of the committed trajectory; at least the vehicle itself.
+  std::span<const Vector3> trajectory_W{};
   /// Where something was seen to move lately: what the map holds near these may be gone, and an image that
   /// shows nothing there is not suspicious (own map).
   std::span<const Vector3> moved_W{};
@@ -47,12 +47,10 @@ struct ExportRequest {
 };
 
 /// Contract (proved on every implementation by tests/stages/perception/occupancy_map_contract_test.cpp):
-///  1. Space never seen is unknown. A frame that was refused and a hole of NaN pixels change nothing (a
-///  single lost pixel
-///     among valid neighbours counts as the nearest of them).
+///  1. Space never seen is unknown. A frame that was refused and a hole of NaN pixels change nothing.
+///     (A single lost pixel among valid neighbours counts as the nearest of them.)
 ///  2. After one integration at level 0 of a clean frame, the cells that a ray crossed well before its end
-///  are free,
-///     and the cell at its end (or a face neighbour) is occupied.
+///     are free, and the cell at its end (or a face neighbour) is occupied.
 ///  3. A free write at a coarse level never clears a finer cell in which a surface was seen in this scan.
 ///  4. Evidence is bounded: what moved away is free again after at most 10 scans that look through it.
 ///  5. The same calls in the same order give the same map: digest() is equal, on every machine (own backend).

@@ -5,6 +5,7 @@
 
 #include "core/precision.hpp"
 #include "core/random/counter_rng.hpp"
+#include "firmware_if/assert.hpp"
 
 namespace roborun::stages {
 
@@ -12,7 +13,9 @@ PointCloud::PointCloud(const Config& config, core::Arena& arena) noexcept
     : grid_(arena.take<Entry>(config.max_points, "cloud grid")),
       point_(arena.take<CloudPoint>(config.max_points, "cloud points")),
       point_pool_(arena.last_pool()),
-      used_(arena.take<std::uint32_t>(config.max_points, "cloud used entries")) {}
+      used_(arena.take<std::uint32_t>(config.max_points, "cloud used entries")) {
+  ROBORUN_ASSERT(config.validate() == Status::kOk);
+}
 
 void PointCloud::set_height_limits(double low_m, double high_m) noexcept {
   low_m_ = low_m;

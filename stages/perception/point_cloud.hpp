@@ -38,7 +38,7 @@ class PointCloud {
   [[nodiscard]] static constexpr std::size_t arena_bytes(const Config& config) noexcept {
     return config.max_points * (sizeof(Entry) + sizeof(CloudPoint) + sizeof(std::uint32_t)) + 64;
   }
-  /// Precondition: config.validate() is kOk. Check arena.exhausted() afterwards.
+  /// Precondition, asserted: config.validate() is kOk. Check arena.exhausted() afterwards.
   PointCloud(const Config& config, core::Arena& arena) noexcept;
 
   /// Averages the surfaces of all frames in cells of cell_size_m(level). Bad frames (FrameGuard) are refused

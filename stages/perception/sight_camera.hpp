@@ -12,8 +12,8 @@ inline constexpr std::size_t kMaxCameras = 8;
 
 /// What the kernels read of a camera. Single precision: positions are relative to the camera.
 struct SightCamera {
-  /// A block is free only if every pixel sees constant_m + quadratic_per_m * depth^2 past it: stereo's error grows with
-  /// the square of the depth.
+  /// A block is free only if every pixel sees constant_m + quadratic_per_m * depth^2 past it: stereo's error
+  /// grows with the square of the depth.
   struct Margin {
     double constant_m{};
     double quadratic_per_m{};

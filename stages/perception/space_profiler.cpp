@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/geometry/math.hpp"
+#include "firmware_if/assert.hpp"
 #include "stages/perception/polled_view.hpp"
 
 namespace roborun::stages {
@@ -104,6 +105,7 @@ Status profile_space(const SpaceProfilerConfig& config, std::span<const CloudPoi
                      const MapView& map, const Trajectory& committed, MonotonicTime now, const Vector3& p_WB,
                      const Vector3& v_WB, const Vector3& goal_W, const Aabb& relevant_W, double radius_m,
                      SpaceProfile& profile, core::StageBudget& budget, core::Work& work) noexcept {
+  ROBORUN_ASSERT(config.validate() == Status::kOk);
   const PolledView view(map, budget, work);
   const bool all = profile_points(config, points, p_WB, goal_W, relevant_W, budget, work, profile);
   if (!all) {

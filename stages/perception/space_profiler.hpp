@@ -5,20 +5,31 @@
 
 #include "core/executive/stage_budget.hpp"
 #include "core/geometry/vector.hpp"
+#include "core/range.hpp"
 #include "core/space_profile.hpp"
 #include "core/trajectory.hpp"
+#include "core/vehicle_model.hpp"
 #include "stages/perception/map_view.hpp"
 #include "stages/perception/point_cloud.hpp"
 
 namespace roborun::stages {
 
 struct SpaceProfilerConfig {
-  double vehicle_width_m{1.2};  ///< A gap narrower than this is no gap.
-  double widest_gap_m{20.0};    ///< A gap wider than this does not ask for precision.
-  double gap_reach_m{15.0};     ///< Obstacles farther than this belong to a later decision.
-  double height_band_m{1.5};    ///< Points this much above or below the vehicle can stand in its way.
-  double outlook_step_s{0.25};  ///< Spacing of the samples along the trajectory (doubled until they fit).
-  double max_visible_m{25.0};   ///< The range of the cameras.
+  double vehicle_width_m{2.0 * VehicleModel{}.radius_m};  ///< A gap narrower than this is no gap. (0, 20]
+  double widest_gap_m{20.0};  ///< A gap wider than this does not ask for precision. (vehicle width, 1000]
+  double gap_reach_m{15.0};   ///< Obstacles farther than this belong to a later decision. (0, 1000]
+  /// Points this much above or below the vehicle can stand in its way. (0, 100]
+  double height_band_m{1.5};
+  /// Spacing of the samples along the trajectory (doubled until they fit). [0.001, 60]
+  double outlook_step_s{0.25};
+  double max_visible_m{25.0};  ///< The range of the cameras. (0, 1000]
+  [[nodiscard]] constexpr Status validate() const noexcept {
+    const bool ok = core::above(vehicle_width_m, 0.0, 20.0) &&
+                    core::above(widest_gap_m, vehicle_width_m, 1000.0) &&
+                    core::above(gap_reach_m, 0.0, 1000.0) && core::above(height_band_m, 0.0, 100.0) &&
+                    core::within(outlook_step_s, 0.001, 60.0) && core::above(max_visible_m, 0.0, 1000.0);
+    return ok ? Status::kOk : Status::kInvalidArgument;
+  }
 };
 
 /// Gaps: the points in the height band are sorted into 72 sectors of 5 degrees, the nearest point of each
@@ -30,7 +41,8 @@ struct SpaceProfilerConfig {
 /// max_visible_m. Outlook: up to 32 samples of the trajectory from `now` to its end, each with the free
 /// distance along its motion there. `work.units` grows by the map cells visited. The budget is polled every
 /// 1,024 points and lookups; once it is spent (kBudgetSpent, otherwise kOk) what has not been looked at
-/// counts as near: distances 0, a gap as narrow as the vehicle. RT-safe: O(points + samples * range / cell).
+/// counts as near: distances 0, a gap as narrow as the vehicle.
+/// Precondition, asserted: config.validate() is kOk. RT-safe: O(points + samples * range / cell).
 [[nodiscard]] Status profile_space(const SpaceProfilerConfig& config, std::span<const CloudPoint> points,
                                    const MapView& view, const Trajectory& committed, MonotonicTime now,
                                    const Vector3& p_WB, const Vector3& v_WB, const Vector3& goal_W,

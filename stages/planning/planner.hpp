@@ -20,8 +20,8 @@ using Path = core::StaticVector<Vector3, kMaxWaypoints>;
 
 struct PlanRequest {
   Vector3 start_W = Vector3::Zero();
-  Vector3 goal_W =
-      Vector3::Zero();   ///< Final goal of the mission; most of the time far outside the known space.
+  /// Final goal of the mission; most of the time far outside the known space.
+  Vector3 goal_W = Vector3::Zero();
   Aabb bounds_W{};       ///< The vehicle's centre stays inside.
   double radius_m{};     ///< Vehicle and tracking error; every point of the path keeps this box free.
   double volume_m3{};    ///< v2: stop when the explored volume exceeds it.
@@ -41,14 +41,17 @@ struct PlanResult {
 
 /// Contract (proved on every implementation by tests/stages/planning/planner_contract_test.cpp):
 ///  1. Every straight piece of a returned path passes is_segment_free() on the given view. Unknown is not
-///  free.
+///     free.
 ///  2. If the goal cannot be reached inside known free space, the path leads to the point of it from which
-///  the goal
-///     promises to be nearest: least path length plus kUnknownWeight times the remaining straight distance.
-///  3. kStartBlocked, kGoalBlocked (goal occupied or out of bounds, with the path to the nearest point if
-///  there is
-///     one), kNoPath (nothing better than the start), kInvalidArgument (not finite, empty bounds) are
-///     answers, not errors; kBudgetSpent comes with the best path so far.
+///     the goal promises to be nearest: least path length plus kUnknownWeight times the remaining straight
+///     distance.
+///  3. These are answers, not errors:
+///      - kStartBlocked;
+///      - kGoalBlocked: the goal is occupied or out of bounds; with the path to the nearest point, if there
+///        is one;
+///      - kNoPath: nothing is better than the start;
+///      - kInvalidArgument: not finite, or empty bounds;
+///      - kBudgetSpent: with the best path so far.
 class Planner {
  public:
   virtual ~Planner() = default;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/geometry/math.hpp"
+#include "firmware_if/assert.hpp"
 #include "stages/perception/polled_view.hpp"
 
 namespace roborun::stages {
@@ -16,8 +17,8 @@ constexpr double kGoalBias = 0.15;
 constexpr double kEscape_m = 2.0;
 constexpr std::uint64_t kSpare = 4096;  // lookups that are granted whatever the budget says
 constexpr double kLookAhead_m = 12.0;   // beyond a path's end
-constexpr double kDetour_m =
-    10.0;  // what a surface right ahead of a path's end costs: the way around a pillar
+// What a surface right ahead of a path's end costs: the way around a pillar.
+constexpr double kDetour_m = 10.0;
 
 Vector3 towards_goal(const PlanRequest& request) noexcept {
   const Vector3 way = request.goal_W - request.start_W;
@@ -65,7 +66,9 @@ RrtStar::RrtStar(const Config& config, core::Arena& arena) noexcept
       node_(arena.take<Node>(config.max_nodes, "planner nodes")),
       node_pool_(arena.last_pool()),
       visited_(arena.take<std::uint64_t>(kVisited, "planner visited cells")),
-      grid_(config.max_nodes, arena) {}
+      grid_(config.max_nodes, arena) {
+  ROBORUN_ASSERT(config.validate() == Status::kOk);
+}
 
 double RrtStar::promise_m(const Node& node, const Vector3& goal_W) const noexcept {
   return node.cost_m + kUnknownWeight * (goal_W - node.p_W).norm();
@@ -170,8 +173,8 @@ std::int32_t RrtStar::try_extend(Search& s, const Vector3& sample_W, double boun
   if (!s.view.is_free(Aabb::around(p_W, request.radius_m), s.work.units)) return -1;
 
   const double n = static_cast<double>(count_ + 1);
-  const double shrink =
-      std::sqrt(std::sqrt(core::log(n) / n));  // at least the (log n / n)^(1/3) of RRT* asks for
+  // At least the (log n / n)^(1/3) that RRT* asks for.
+  const double shrink = std::sqrt(std::sqrt(core::log(n) / n));
   const double radius_m = std::fmax(config_.rewire_m * std::fmin(1.0, 1.5 * shrink), 1.5);
   Neighbours near{};
   const std::size_t count = grid_.within(p_W, std::fmax(radius_m, (p_W - from_W).norm() + 1e-9), near);

@@ -44,7 +44,7 @@ class RrtStar final : public Planner {
     return config.max_nodes * sizeof(Node) + kVisited * sizeof(std::uint64_t) + 128 +
            NodeGrid::arena_bytes(config.max_nodes);
   }
-  /// Precondition: config.validate() is kOk. Check arena.exhausted() afterwards.
+  /// Precondition, asserted: config.validate() is kOk. Check arena.exhausted() afterwards.
   RrtStar(const Config& config, core::Arena& arena) noexcept;
 
   /// Explored volume: distinct 4.8 m cells that hold a node, times their size. Polls the budget at every

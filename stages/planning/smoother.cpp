@@ -12,16 +12,23 @@ constexpr double kAtRest = 0.05;  // m/s and m/s2
 constexpr double kSameWaypoint_m = 0.25;
 constexpr double kMinSegment_s = 0.15;
 constexpr double kCruisePiece_m = 5.0;
-constexpr double kProfileShare =
-    0.60;  // of the acceleration limit: the curve around the profile needs the rest
+// Of the acceleration limit: the curve around the profile needs the rest.
+constexpr double kProfileShare = 0.60;
 constexpr double kCornerCut_m = 0.3;  // how far a corner may be cut: the planner leaves about so much room
 constexpr double kLimitTolerance = 1.05;
-constexpr double kJerk_mps3 = 20.0;  // beyond it the vehicle overshoots the attitude
-constexpr int kSamples = 12;         // per segment, for the limits
+constexpr int kSamples = 12;  // per segment, for the limits
 constexpr int kStretchRounds = 10;
 constexpr int kSplitRounds = 6;
 constexpr int kSlowRounds = 4;
 constexpr double kMaxStart_mps = 50.0;  // a state that is faster is no state of this vehicle
+
+/// The speed limit along a way that climbs or descends: its vertical part keeps that limit, too.
+double limit_along_mps(const Vector3& way, double length_m, const MotionLimits& limits) noexcept {
+  const double vertical_mps = way.z() > 0.0 ? limits.climb_mps : limits.descent_mps;
+  const double rise_m = std::fabs(way.z());
+  return rise_m * limits.speed_mps > vertical_mps * length_m ? vertical_mps * length_m / rise_m
+                                                             : limits.speed_mps;
+}
 
 /// Distance needed to change between two speeds: v1^2 = v0^2 + 2 a s.
 double change_m(double from_mps, double to_mps, double a_mps2) noexcept {
@@ -39,9 +46,14 @@ double corner_speed_mps(const Vector3& before, const Vector3& after, double a_mp
   return std::sqrt(a_mps2 * kCornerCut_m * half / (1.0 - half));
 }
 
-/// Raises the squares of speed, acceleration and jerk to those at one instant.
-void add_motion(const PolynomialSegment& segment, double at_s, double& speed2, double& acceleration2,
-                double& jerk2) noexcept {
+/// The most of a segment: squares, whose roots are taken once.
+struct Motion {
+  double speed2{}, acceleration2{}, jerk2{};
+  double climb_mps{}, descent_mps{};
+};
+
+/// Raises what is most to what is at one instant.
+void add_motion(const PolynomialSegment& segment, double at_s, Motion& most) noexcept {
   Vector3 v_W = Vector3::Zero();
   Vector3 a_W = Vector3::Zero();
   Vector3 half_j_W = Vector3::Zero();
@@ -50,15 +62,15 @@ void add_motion(const PolynomialSegment& segment, double at_s, double& speed2, d
     a_W = a_W * at_s + v_W;
     v_W = v_W * at_s + static_cast<double>(k) * segment.coefficient[k];
   }
-  speed2 = std::max(speed2, v_W.squaredNorm());
-  acceleration2 = std::max(acceleration2, a_W.squaredNorm());
-  jerk2 = std::max(jerk2, 4.0 * half_j_W.squaredNorm());
+  most.speed2 = std::max(most.speed2, v_W.squaredNorm());
+  most.acceleration2 = std::max(most.acceleration2, a_W.squaredNorm());
+  most.jerk2 = std::max(most.jerk2, 4.0 * half_j_W.squaredNorm());
+  most.climb_mps = std::max(most.climb_mps, v_W.z());
+  most.descent_mps = std::max(most.descent_mps, -v_W.z());
 }
 
 bool is_well_posed(const SmoothRequest& request) noexcept {
-  const MotionLimits& limits = request.limits;
-  return is_finite(request.start) && limits.speed_mps > 0.0 && limits.speed_mps <= 30.0 &&
-         limits.acceleration_mps2 > 0.0 && limits.acceleration_mps2 <= 20.0 && request.radius_m > 0.0 &&
+  return is_finite(request.start) && request.limits.validate() == Status::kOk && request.radius_m > 0.0 &&
          request.start.v_W.norm() <= kMaxStart_mps;
 }
 
@@ -66,14 +78,17 @@ using Speeds = std::array<double, MinimumSnap::kMaxKnots>;
 
 /// Steps 1 and 2 of allocate(): the highest speed at each point of the path from which every later corner, and
 /// the stop at the end, can still be braked for: v_i^2 <= v_(i+1)^2 + 2 a length.
-void limit_speeds(std::span<const Vector3> path_W, const TrajectoryPoint& start, double limit_mps,
+void limit_speeds(std::span<const Vector3> path_W, const TrajectoryPoint& start, const MotionLimits& limits,
                   double a_mps2, Speeds& speed_mps) noexcept {
   const std::size_t n = path_W.size();
   const Vector3 first = (path_W[1] - path_W[0]).normalized();
   speed_mps[0] = std::max(start.v_W.dot(first), 0.0);
   for (std::size_t i = 1; i + 1 < n; ++i) {
+    const Vector3 before = path_W[i] - path_W[i - 1];
+    const Vector3 after = path_W[i + 1] - path_W[i];
     speed_mps[i] =
-        std::min(limit_mps, corner_speed_mps(path_W[i] - path_W[i - 1], path_W[i + 1] - path_W[i], a_mps2));
+        std::min({limit_along_mps(before, before.norm(), limits),
+                  limit_along_mps(after, after.norm(), limits), corner_speed_mps(before, after, a_mps2)});
   }
   speed_mps[n - 1] = 0.0;
   for (std::size_t i = n - 1; i-- > 1;) {
@@ -152,14 +167,15 @@ bool Smoother::allocate(std::span<const Vector3> path_W, const TrajectoryPoint& 
   const std::size_t n = path_W.size();
   const double a_mps2 = kProfileShare * limits.acceleration_mps2;
   Speeds speed_mps{};
-  limit_speeds(path_W, start, limits.speed_mps, a_mps2, speed_mps);
+  limit_speeds(path_W, start, limits, a_mps2, speed_mps);
   plan.count = 0;
   if (!plan.add(path_W[0], 0.0)) return false;
   for (std::size_t i = 0; i + 1 < n; ++i) {
     const double length_m = (path_W[i + 1] - path_W[i]).norm();
     const double v0 = speed_mps[i];
     speed_mps[i + 1] = std::min(speed_mps[i + 1], std::sqrt(v0 * v0 + 2.0 * a_mps2 * length_m));
-    const SpeedProfile profile(length_m, v0, speed_mps[i + 1], limits.speed_mps, a_mps2);
+    const double limit_mps = limit_along_mps(path_W[i + 1] - path_W[i], length_m, limits);
+    const SpeedProfile profile(length_m, v0, speed_mps[i + 1], limit_mps, a_mps2);
     if (!plan.add_piece(path_W[i], path_W[i + 1], profile, i + 2 == n)) return false;
   }
   return true;
@@ -179,23 +195,23 @@ bool Smoother::stretch_to_limits(const Task& task, const MotionLimits& limits, P
   const double speed_limit = std::max(limits.speed_mps * kLimitTolerance, request.start.v_W.norm() + 0.01);
   const double acceleration_limit =
       std::max(limits.acceleration_mps2 * kLimitTolerance, request.start.a_W.norm() + 0.01);
-  const double jerk_limit = std::max(kJerk_mps3 * kLimitTolerance, request.start.j_W.norm() + 0.01);
+  const double climb_limit = std::max(limits.climb_mps * kLimitTolerance, request.start.v_W.z() + 0.01);
+  const double descent_limit = std::max(limits.descent_mps * kLimitTolerance, 0.01 - request.start.v_W.z());
+  const double jerk_limit = std::max(limits.jerk_mps3 * kLimitTolerance, request.start.j_W.norm() + 0.01);
   for (int round = 0; round < kStretchRounds && !task.budget.spent(task.work); ++round) {
     if (!solve(plan, request.start, out)) return false;
     bool fine = true;
     for (std::size_t k = 0; k < out.segment_count; ++k) {
-      // Compared as squares; the roots are taken once.
-      double speed2 = 0.0;
-      double acceleration2 = 0.0;
-      double jerk2 = 0.0;
+      Motion most;
       for (int i = 0; i <= kSamples; ++i)
-        add_motion(out.segment[k], out.segment[k].duration_s * i / kSamples, speed2, acceleration2, jerk2);
+        add_motion(out.segment[k], out.segment[k].duration_s * i / kSamples, most);
       // A time that is k times as long divides speed by k, acceleration by k^2 and jerk by k^3. The cube root
       // of the jerk's excess is near enough to its power 3/8, which square roots can make.
-      const double jerk_root = std::sqrt(std::sqrt(std::sqrt(std::sqrt(jerk2) / jerk_limit)));
-      const double worst = std::max({1.0, std::sqrt(speed2) / speed_limit,
-                                     std::sqrt(std::sqrt(acceleration2) / acceleration_limit),
-                                     jerk_root * jerk_root * jerk_root});
+      const double jerk_root = std::sqrt(std::sqrt(std::sqrt(std::sqrt(most.jerk2) / jerk_limit)));
+      const double worst = std::max({1.0, std::sqrt(most.speed2) / speed_limit,
+                                     std::sqrt(std::sqrt(most.acceleration2) / acceleration_limit),
+                                     jerk_root * jerk_root * jerk_root, most.climb_mps / climb_limit,
+                                     most.descent_mps / descent_limit});
       if (worst > 1.0) {
         fine = false;
         plan.time_s[k + 1] *= std::min(1.0 + 1.1 * (worst - 1.0) + 0.02, 1.5);
@@ -301,8 +317,8 @@ Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, c
     return Status::kOk;
   }
   // Acceleration goes straight to its limit against the motion, stays there, and goes straight to zero.
-  const double ramp_in_s = (start.a_W.norm() + limits.acceleration_mps2) / kJerk_mps3;
-  const double ramp_out_s = limits.acceleration_mps2 / kJerk_mps3;
+  const double ramp_in_s = (start.a_W.norm() + limits.acceleration_mps2) / limits.jerk_mps3;
+  const double ramp_out_s = limits.acceleration_mps2 / limits.jerk_mps3;
   const Vector3 to_lose = start.v_W + 0.5 * ramp_in_s * start.a_W;
   const double ramps_s = 0.5 * (ramp_in_s + ramp_out_s);
   const double braking_mps2 = std::min(limits.acceleration_mps2, to_lose.norm() / ramps_s);
@@ -343,11 +359,11 @@ bool append_rest_to_rest(const Vector3& from_W, const Vector3& to_W, const Motio
   const double before_s = trajectory.duration_s();
   PolynomialSegment& segment = trajectory.segment[trajectory.segment_count++];
   segment = {};
-  segment.duration_s = std::max({kPeakSpeed * length_m / limits.speed_mps,
+  segment.duration_s = std::max({kPeakSpeed * length_m / limit_along_mps(way, length_m, limits),
                                  std::sqrt(kPeakAcceleration * length_m / limits.acceleration_mps2), 0.1});
   for (int i = 0; i < 32; ++i) {
     const double cubed = segment.duration_s * segment.duration_s * segment.duration_s;
-    if (kPeakJerk * length_m <= kJerk_mps3 * cubed) break;
+    if (kPeakJerk * length_m <= limits.jerk_mps3 * cubed) break;
     segment.duration_s *= 1.1;
   }
   segment.coefficient[0] = from_W;

@@ -8,7 +8,9 @@
 
 #include "core/executive/stage_budget.hpp"
 #include "core/memory/static_vector.hpp"
+#include "core/range.hpp"
 #include "core/trajectory.hpp"
+#include "core/vehicle_model.hpp"
 #include "firmware_if/status.hpp"
 #include "stages/perception/polled_view.hpp"
 #include "stages/planning/minimum_snap.hpp"
@@ -16,8 +18,18 @@
 namespace roborun::stages {
 
 struct MotionLimits {
-  double speed_mps{6.0};          ///< (0, 30]
-  double acceleration_mps2{4.0};  ///< (0, 20]. |a| along the whole trajectory, braking included.
+  double speed_mps{VehicleModel{}.speed_mps};  ///< (0, 30]
+  double acceleration_mps2{
+      VehicleModel{}.acceleration_mps2};       ///< (0, 30]. |a| along the whole trajectory, braking included.
+  double jerk_mps3{VehicleModel{}.jerk_mps3};  ///< (0, 1000]. Beyond it the vehicle overshoots the attitude.
+  double climb_mps{30.0};                      ///< (0, 30]. Upwards ...
+  double descent_mps{30.0};                    ///< (0, 30]. ... and downwards.
+  [[nodiscard]] constexpr Status validate() const noexcept {
+    const bool ok = core::above(speed_mps, 0.0, 30.0) && core::above(acceleration_mps2, 0.0, 30.0) &&
+                    core::above(jerk_mps3, 0.0, 1000.0) && core::above(climb_mps, 0.0, 30.0) &&
+                    core::above(descent_mps, 0.0, 30.0);
+    return ok ? Status::kOk : Status::kInvalidArgument;
+  }
 };
 
 struct SmoothRequest {
@@ -39,7 +51,7 @@ class Smoother {
   /// way-point where the final braking begins; the curve is then checked: too fast, and the segment gets more
   /// time; not free, and the straight piece below it gets one more way-point; still not, and the speed limit
   /// is lowered; from rest, the last resort is to fly the pieces straight and stop at each corner. kOk: every
-  /// point of the trajectory keeps its box free in `view`, and speed, acceleration and jerk (20 m/s3) are
+  /// point of the trajectory keeps its box free in `view`, and speed, acceleration and jerk are
   /// within the limits (5 %; where the start state itself is beyond a limit, never more beyond than there).
   /// kNoPath: no such curve was found; kBudgetSpent; kInvalidArgument (not finite, fewer than two distinct
   /// points): in all three cases `result.trajectory` is untouched. Polls the budget before each solution and,
@@ -47,7 +59,7 @@ class Smoother {
   [[nodiscard]] Status smooth(const SmoothRequest& request, const MapView& view, core::StageBudget& budget,
                               SmoothResult& result) noexcept;
 
-  /// The shortest stop along the present velocity within the limits of acceleration and jerk (20 m/s3), or a
+  /// The shortest stop along the present velocity within the limits of acceleration and jerk, or a
   /// hold at rest. Three segments, continuous up to acceleration: to the limit, at the limit, to zero.
   /// kInvalidArgument: not finite or speed above 50 m/s; `out` untouched. RT-safe: O(1).
   [[nodiscard]] Status brake(const TrajectoryPoint& start, MonotonicTime start_time,

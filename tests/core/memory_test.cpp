@@ -42,10 +42,6 @@ TEST(StaticVector, RefusesWhatDoesNotFit) {
   EXPECT_FALSE(sut.push_back(4));
   EXPECT_EQ(sut.size(), 3U);
   EXPECT_EQ(sut.back(), 3);
-  sut.truncate(1);
-  EXPECT_EQ(sut.size(), 1U);
-  sut.truncate(2);
-  EXPECT_EQ(sut.size(), 1U);
 }
 
 TEST(Precision, DoublesFromThirtyCentimetres) {

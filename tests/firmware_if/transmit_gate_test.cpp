@@ -24,6 +24,29 @@ EscRawCommand throttles(std::initializer_list<std::int16_t> values) {
   return command;
 }
 
+/// A wire of the kill switch.
+class Wire final : public GpioInput {
+ public:
+  explicit Wire(bool active) : level(active) {}
+  [[nodiscard]] Result<bool> active() noexcept override { return level; }
+  [[nodiscard]] Status next_edge(GpioEdge&) noexcept override { return Status::kNotReady; }
+  bool level;
+};
+
+/// A switch that stands on "run".
+struct Switch {
+  Wire open{false}, closed{true};
+  KillSwitch sut{open, closed};
+
+  /// Two samples of each position: killed, if it was pressed.
+  void turn(bool pressed) {
+    open.level = pressed;
+    closed.level = !pressed;
+    (void)sut.sample();
+    (void)sut.sample();
+  }
+};
+
 struct Rig {
   test::RecordingBus bus;
   TransmitGate sut{{}, bus};
@@ -92,27 +115,62 @@ TEST(TransmitGate, PassesExactlyItsListOfAll65536TypeIds) {
 TEST(TransmitGate, SendsZerosUnlessArmedAliveAndNotKilled) {
   Rig rig;
   EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 0);  // disarmed
-  ASSERT_EQ(rig.sut.arm(), Status::kOk);
+  ASSERT_EQ(rig.sut.arm_unproven(), Status::kOk);
   EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 100);
   rig.now += milliseconds{6};  // with the 2.5 ms of the call: 8.5 ms since the last beat
   EXPECT_EQ(rig.command({100, 100, 100, 100}, false).cmd.items[0], 0);
   EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 100);
   rig.sut.kill();
   EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 0);
-  EXPECT_EQ(rig.sut.arm(), Status::kInvalidArgument);
+  EXPECT_EQ(rig.sut.arm_unproven(), Status::kInvalidArgument);
   EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 0);
-  rig.sut.reset_kill();
+  Switch kill_switch;
+  kill_switch.turn(false);
+  EXPECT_EQ(rig.sut.reset_kill(kill_switch.sut), Status::kOk);
   EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 0);  // a released switch does not re-arm
-  ASSERT_EQ(rig.sut.arm(), Status::kOk);
+  ASSERT_EQ(rig.sut.arm_unproven(), Status::kOk);
   EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 100);
   rig.sut.disarm();
   EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 0);
   EXPECT_EQ(rig.sut.counters().zeroed, 6U * 4U);
 }
 
+TEST(TransmitGate, ArmsOnlyWithAProvenSwitchOnRun) {
+  Rig rig;
+  Switch kill_switch;
+  EXPECT_EQ(rig.sut.arm(kill_switch.sut), Status::kNotReady) << "never sampled";
+  kill_switch.turn(false);
+  EXPECT_EQ(rig.sut.arm(kill_switch.sut), Status::kNotReady) << "never pressed: a wire may be stuck";
+  kill_switch.turn(true);
+  ASSERT_TRUE(kill_switch.sut.proven());
+  EXPECT_EQ(rig.sut.arm(kill_switch.sut), Status::kNotReady) << "still pressed";
+  kill_switch.turn(false);
+  ASSERT_TRUE(kill_switch.sut.released());
+  EXPECT_EQ(rig.sut.arm(kill_switch.sut), Status::kInvalidArgument) << "killed, and not reset";
+  EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 0);
+  ASSERT_EQ(kill_switch.sut.reset(), Status::kOk);
+  EXPECT_EQ(rig.sut.arm(kill_switch.sut), Status::kOk);
+  EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 100);
+}
+
+TEST(TransmitGate, ForgetsAKillOnlyWithAReleasedSwitch) {
+  Rig rig;
+  Switch kill_switch;
+  kill_switch.turn(true);
+  rig.sut.kill();
+  EXPECT_EQ(rig.sut.reset_kill(kill_switch.sut), Status::kNotReady) << "pressed";
+  kill_switch.turn(false);
+  EXPECT_EQ(rig.sut.reset_kill(kill_switch.sut), Status::kNotReady) << "the switch itself is not reset";
+  EXPECT_EQ(rig.sut.arm_unproven(), Status::kInvalidArgument);
+  ASSERT_EQ(kill_switch.sut.reset(), Status::kOk);
+  ASSERT_EQ(rig.sut.reset_kill(kill_switch.sut), Status::kOk);
+  EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 0) << "disarmed until armed again";
+  EXPECT_EQ(rig.sut.arm(kill_switch.sut), Status::kOk);
+}
+
 TEST(TransmitGate, RefusesABeatFromTheFuture) {
   Rig rig;
-  ASSERT_EQ(rig.sut.arm(), Status::kOk);
+  ASSERT_EQ(rig.sut.arm_unproven(), Status::kOk);
   rig.sut.beat(rig.now + milliseconds{100});
   EXPECT_FALSE(rig.sut.live(rig.now));
   EXPECT_TRUE(rig.sut.live(rig.now + milliseconds{100}));
@@ -122,7 +180,7 @@ TEST(TransmitGate, RefusesABeatFromTheFuture) {
 
 TEST(TransmitGate, ClampsToForwardAndLimitsTheRiseOnly) {
   Rig rig;
-  ASSERT_EQ(rig.sut.arm(), Status::kOk);
+  ASSERT_EQ(rig.sut.arm_unproven(), Status::kOk);
   (void)rig.command({0, 0, 0, 0});
   // 2.5 ms of 8191 * 40 per second: 819.
   EscRawCommand out = rig.command({8191, 500, -500, 819});

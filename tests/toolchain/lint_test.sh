@@ -19,7 +19,7 @@ expect() {
     failed=1
   fi
 }
-fresh; expect passes layers "a clean tree"; expect passes words "a clean tree"
+fresh; for check in layers words complexity; do expect passes $check "a clean tree"; done
 fresh; echo '#include "stages/x.hpp"' >"$tree/core/bad.hpp"; expect refuses layers "core includes stages"
 fresh; echo '#include "stages/x.hpp"' >"$tree/governor/bad.hpp"; expect refuses layers "governor includes stages"
 fresh; echo '#include "governor/x.hpp"' >"$tree/stages/bad.hpp"; expect refuses layers "stages include governor"
@@ -27,11 +27,35 @@ fresh; echo '#include "core/x.hpp"' >"$tree/firmware_if/bad.hpp"; expect refuses
 fresh; echo '#include <unistd.h>' >"$tree/core/bad.hpp"; expect refuses layers "an OS header in core"
 fresh; mkdir "$tree/extra"; expect refuses layers "another top-level folder"
 fresh; rm "$tree/core/clean.hpp"; expect refuses layers "nothing to check"; expect refuses words "nothing to check"
+fresh; rm "$tree/core/clean.hpp"; expect refuses complexity "nothing to check"
 for line in 'int* p = new int;' 'void* p = malloc(4);' 'std::vector<int> v;' 'throw 1;' 'std::mutex m;' 'auto t = steady_clock::now();' \
   'double y = std::sin(x);' '#include <vector>'; do
   fresh; echo "$line" >"$tree/core/bad.cpp"; expect refuses words "$line"
 done
 fresh; echo '// a new thread may throw' >"$tree/core/comment.cpp"; expect passes words "words in a comment"
+
+# lines COUNT TEXT: the text, so many times.
+lines() { for ((i = 0; i < $1; ++i)); do printf '%s\n' "$2"; done; }
+for folder in firmware_if core governor stages platform/flight; do
+  fresh; mkdir -p "$tree/$folder"; lines 501 '// long' >"$tree/$folder/bad.cpp"; expect refuses complexity "501 lines in $folder"
+done
+fresh; lines 500 '// long' >"$tree/core/fine.cpp"; expect passes complexity "500 lines"
+fresh; mkdir "$tree/platform/can"; lines 501 '// long' >"$tree/platform/can/fine.cpp"; expect passes complexity "a long file of a tool"
+# function BODY: a member function of a template, its body behind what a parser can trip over.
+function_of() {
+  printf '%s\n' '#if 1' '#define BRACE {' '#endif' 'namespace a::b { template <typename T> struct S {' "  char c{'{'};" \
+    '  S(int x) noexcept : y_{x}, z_(x) {}' '  const char* text = R"(if { && )"; int big = 1'"'"'000'"'"'000;' \
+    '  auto bad(T&& t) const -> decltype(t) {' "$1" '  }' '  int y_, z_;' '}; }'
+}
+fresh; function_of "$(lines 58 '    x();')" >"$tree/core/fine.cpp"; expect passes complexity "a function of 60 lines"
+fresh; function_of "$(lines 59 '    x();')" >"$tree/core/bad.cpp"; expect refuses complexity "a function of 61 lines"
+for branch in 'if (x) y();' 'for (;;) y();' 'while (x) y();' 'a = x && y;' 'a = x || y;' 'a = x ? y : z;' 'catch (X) {}' 'case 1:' 'f([] { if (x) y(); });'; do
+  fresh; function_of "$(lines 19 "    $branch")" >"$tree/core/fine.cpp"; expect passes complexity "20: $branch"
+  fresh; function_of "$(lines 20 "    $branch")" >"$tree/core/bad.cpp"; expect refuses complexity "21: $branch"
+done
+fresh; function_of "$(lines 30 '    auto&& x = y; // if while && ?' | sed 's/$/ f("if (x) ? &&");/')" >"$tree/core/fine.cpp"; expect passes complexity "branches in comments and text"
+fresh; echo 'void f() {' >"$tree/core/bad.cpp"; expect refuses complexity "a brace that is never closed"
+
 if command -v c++ >/dev/null; then
   echo '#include <cstdlib>
   void* grab(unsigned long n) { return std::malloc(n); }' | c++ -x c++ -c -o "$tree/bad.o" - && ar rc "$tree/bad.a" "$tree/bad.o"

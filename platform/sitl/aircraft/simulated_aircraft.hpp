@@ -23,7 +23,6 @@ struct SimulatorConfig {
   std::vector<std::vector<LidarRay>>
       lidar_patterns{};  ///< By LiDAR of the rig; none or an empty one: its rings.
   NavigationSensorsConfig sensors{};
-  VehicleConfig vehicle{};
   WindConfig wind{};
 };
 
@@ -40,9 +39,10 @@ class ExposureSink {
 class SimulatedAircraft final : public flight::Aircraft {
  public:
   /// Stands on the ground at `ground_W`. `cameras` and what is outside must outlive it.
-  SimulatedAircraft(const SimulatorConfig& config, const Vector3& ground_W, std::uint64_t seed,
-                    Nanos minor_frame, ExposureSink& cameras, const OutsideActuators& outside = {})
-      : vehicle_(config.vehicle, config.wind, ground_W, seed),
+  SimulatedAircraft(const VehicleModel& vehicle, const SimulatorConfig& config, const Vector3& ground_W,
+                    std::uint64_t seed, Nanos minor_frame, ExposureSink& cameras,
+                    const OutsideActuators& outside = {})
+      : vehicle_(vehicle, config.wind, ground_W, seed),
         sensors_(NavigationSensors(config.sensors, seed)),
         cameras_(cameras),
         far_side_(seed, outside),

@@ -13,9 +13,9 @@ constexpr double kLegs_mps2 = 30.0;
 
 }  // namespace
 
-Vehicle::Vehicle(const VehicleConfig& config, const WindConfig& wind, const Vector3& p_WB,
+Vehicle::Vehicle(const VehicleModel& model, const WindConfig& wind, const Vector3& p_WB,
                  std::uint64_t seed) noexcept
-    : config_(config), wind_(wind), rng_(seed, 2) {
+    : model_(model), wind_(wind), rng_(seed, 2) {
   state_.p_WB = p_WB;
 }
 
@@ -41,31 +41,32 @@ void Vehicle::step(Nanos dt) noexcept {
 
 void Vehicle::substep(double dt_s) noexcept {
   VehicleState& s = state_;
-  const double lag = 1.0 - core::exp(-dt_s / config_.motor_lag_s);
+  const double lag = 1.0 - core::exp(-dt_s / model_.motor_lag_s);
   std::array<double, 4> thrust_N{};
   double total_N = 0.0;
   for (std::size_t i = 0; i < 4; ++i) {
     const double wanted = s.battery_ratio > 0.0 ? command_.thrust_ratio[i] : 0.0;
     s.thrust_ratio[i] += lag * (wanted - s.thrust_ratio[i]);
-    thrust_N[i] = s.thrust_ratio[i] * config_.max_thrust_N;
+    thrust_N[i] = s.thrust_ratio[i] * model_.max_thrust_N;
     total_N += thrust_N[i];
   }
 
   const Matrix3 R_WB = s.q_WB.toRotationMatrix();
   const Vector3 air_W_mps = s.v_WB - wind_W_mps_;
   const Vector3 drag_W_N =
-      -(config_.drag_linear_Nspm + config_.drag_quadratic_Ns2pm2 * air_W_mps.norm()) * air_W_mps;
-  s.a_WB = (R_WB.col(2) * total_N + drag_W_N) / config_.mass_kg - Vector3(0.0, 0.0, core::kGravity_mps2);
+      -(model_.drag_linear_Nspm + model_.drag_quadratic_Ns2pm2 * air_W_mps.norm()) * air_W_mps;
+  s.a_WB = (R_WB.col(2) * total_N + drag_W_N) / model_.mass_kg - Vector3(0.0, 0.0, core::kGravity_mps2);
 
   // Front left, front right, rear left, rear right; front left and rear right push the body
   // counter-clockwise.
-  const double arm_m = config_.arm_m;
+  const double arm_m = model_.arm_m;
   const Vector3 torque_B_Nm(arm_m * (thrust_N[0] - thrust_N[1] + thrust_N[2] - thrust_N[3]),
                             arm_m * (-thrust_N[0] - thrust_N[1] + thrust_N[2] + thrust_N[3]),
-                            config_.yaw_torque_m * (thrust_N[0] - thrust_N[1] - thrust_N[2] + thrust_N[3]));
-  const Vector3 momentum = config_.inertia_kgm2.cwiseProduct(s.w_WB_B);
-  const Vector3 w_dot = (torque_B_Nm - config_.angular_drag_Nms * s.w_WB_B - s.w_WB_B.cross(momentum))
-                            .cwiseQuotient(config_.inertia_kgm2);
+                            model_.yaw_torque_m * (thrust_N[0] - thrust_N[1] - thrust_N[2] + thrust_N[3]));
+  const Vector3 inertia_kgm2 = model_.inertia_kgm2();
+  const Vector3 momentum = inertia_kgm2.cwiseProduct(s.w_WB_B);
+  const Vector3 w_dot = (torque_B_Nm - model_.drag_angular_Nms * s.w_WB_B - s.w_WB_B.cross(momentum))
+                            .cwiseQuotient(inertia_kgm2);
 
   s.on_ground = s.p_WB.z() <= 0.0 && s.a_WB.z() <= 0.0;
   if (s.on_ground && !s.v_WB.isZero(0.0)) {
@@ -90,19 +91,19 @@ void Vehicle::substep(double dt_s) noexcept {
   }
 
   const double axial_mps = R_WB.col(2).dot(air_W_mps);
-  s.power_W = config_.avionics_W;
+  s.power_W = model_.avionics_W;
   for (const double t_N : thrust_N) s.power_W += electrical_power_W(t_N, axial_mps);
   s.energy_J += s.power_W * dt_s;
-  s.battery_ratio = std::fmax(0.0, 1.0 - s.energy_J / config_.battery_J);
+  s.battery_ratio = std::fmax(0.0, 1.0 - s.energy_J / model_.battery_J);
 }
 
 double Vehicle::electrical_power_W(double thrust_N, double axial_mps) const noexcept {
   // Rotor momentum theory: induced velocity in axial flight; descent never gives power back.
-  const double area_m2 = core::kPi * config_.rotor_radius_m * config_.rotor_radius_m;
+  const double area_m2 = core::kPi * model_.rotor_radius_m * model_.rotor_radius_m;
   const double half_mps = 0.5 * std::fmax(axial_mps, 0.0);
   const double induced_mps =
       -half_mps + std::sqrt(half_mps * half_mps + thrust_N / (2.0 * kAirDensity_kgpm3 * area_m2));
-  return thrust_N * (induced_mps + std::fmax(axial_mps, 0.0)) / config_.efficiency_ratio;
+  return thrust_N * (induced_mps + std::fmax(axial_mps, 0.0)) / model_.efficiency_ratio;
 }
 
 }  // namespace roborun::sitl

@@ -12,6 +12,7 @@
 
 #include "core/precision.hpp"
 #include "core/record/state_hash.hpp"
+#include "firmware_if/assert.hpp"
 #include "stages/perception/depth_steps.hpp"
 #include "stages/perception/frame_guard.hpp"
 
@@ -155,14 +156,15 @@ class OctomapBackend final : public OccupancyMap, private MapView {
   }
 
   /// Where the vehicle is, nothing else is: the cells that no ray can tell.
-  static void free_vehicle(octomap::OcTree& tree, const Vector3& p_WB, const Vector3& assumed_half_m) {
+  void free_vehicle(octomap::OcTree& tree, const Vector3& p_WB, const Vector3& assumed_half_m) const {
     const double cell_m = tree.getResolution();
-    const int n = std::max(1, static_cast<int>(std::ceil(std::max(1.0, assumed_half_m.maxCoeff()) / cell_m)));
+    const double reach_m = std::max(config_.vehicle_radius_m + 0.4, assumed_half_m.maxCoeff());
+    const int n = std::max(1, static_cast<int>(std::ceil(reach_m / cell_m)));
     for (int dz = -n; dz <= n; ++dz) {
       for (int dy = -n; dy <= n; ++dy) {
         for (int dx = -n; dx <= n; ++dx) {
           const Vector3 offset = cell_m * Vector3(dx, dy, dz);
-          if (offset.norm() > std::max(0.6, 0.5 * cell_m) &&
+          if (offset.norm() > std::max(config_.vehicle_radius_m, 0.5 * cell_m) &&
               (offset.cwiseAbs() - assumed_half_m).maxCoeff() > 0.0)
             continue;
           const octomap::point3d p = to_octomap(p_WB + offset);
@@ -372,6 +374,7 @@ class OctomapBackend final : public OccupancyMap, private MapView {
 }  // namespace
 
 std::unique_ptr<OccupancyMap> make_octomap_backend(const OctomapConfig& config) noexcept {
+  ROBORUN_ASSERT(config.validate() == Status::kOk);
   try {
     return std::make_unique<OctomapBackend>(config);
   } catch (...) {

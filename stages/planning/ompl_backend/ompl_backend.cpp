@@ -9,6 +9,7 @@
 #include <cmath>
 #include <string>
 
+#include "firmware_if/assert.hpp"
 #include "stages/planning/ompl_backend/ompl_space.hpp"
 
 namespace roborun::stages {
@@ -98,6 +99,7 @@ class OmplPlanner final : public Planner {
 }  // namespace
 
 std::unique_ptr<Planner> make_ompl_planner(std::string_view name, const OmplConfig& config) noexcept {
+  ROBORUN_ASSERT(config.validate() == Status::kOk);
   try {
     const auto names = ompl_planner_names();
     if (std::find(names.begin(), names.end(), name) == names.end()) return nullptr;

@@ -15,7 +15,7 @@ struct Wrench {
 };
 
 /// The physics, written a second time: motors front left, front right, rear left, rear right; FLU axes.
-Wrench wrench(const Airframe& a, const firmware_if::MotorCommand& command) {
+Wrench wrench(const VehicleModel& a, const firmware_if::MotorCommand& command) {
   const double x[] = {a.arm_m, a.arm_m, -a.arm_m, -a.arm_m};
   const double y[] = {a.arm_m, -a.arm_m, a.arm_m, -a.arm_m};
   const double spin[] = {1, -1, -1, 1};
@@ -30,7 +30,7 @@ Wrench wrench(const Airframe& a, const firmware_if::MotorCommand& command) {
 }
 
 TEST(Mixer, GivesExactlyWhatFits) {
-  const Airframe airframe;
+  const VehicleModel airframe;
   const Vector3 torque(0.8, -0.6, 0.1);
   const Wrench w = wrench(airframe, mix(airframe, 44.0, torque));
   EXPECT_NEAR(w.thrust_N, 44.0, 1e-9);
@@ -38,7 +38,7 @@ TEST(Mixer, GivesExactlyWhatFits) {
 }
 
 TEST(Mixer, GivesUpYawFirstThenThrustAndKeepsRollAndPitch) {
-  const Airframe airframe;
+  const VehicleModel airframe;
   const Vector3 torque(6.0, 6.0, 2.0);
   const Wrench w = wrench(airframe, mix(airframe, 90.0, torque));
   EXPECT_NEAR(w.torque_B_Nm.x(), 6.0, 1e-9);
@@ -49,13 +49,13 @@ TEST(Mixer, GivesUpYawFirstThenThrustAndKeepsRollAndPitch) {
 }
 
 TEST(Mixer, ScalesRollAndPitchTogetherWhenEvenTheyDoNotFit) {
-  const Airframe airframe;
+  const VehicleModel airframe;
   const Wrench w = wrench(airframe, mix(airframe, 44.0, Vector3(30.0, 15.0, 0.0)));
   EXPECT_NEAR(w.torque_B_Nm.x() / w.torque_B_Nm.y(), 2.0, 1e-9) << "the direction stays";
 }
 
 TEST(Mixer, StaysWithinZeroAndOneForAnyInput) {
-  const Airframe airframe;
+  const VehicleModel airframe;
   core::CounterRng rng(1);
   for (int i = 0; i < 20000; ++i) {
     const auto any = [&rng] { return 100.0 * rng.normal(); };

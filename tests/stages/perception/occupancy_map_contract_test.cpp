@@ -23,7 +23,7 @@ class OccupancyMapContract : public ::testing::TestWithParam<const char*> {
       config.max_image_width = config.max_image_height = 64;
       sut_ = std::make_unique<BrickMap>(config, arena_);
     } else {
-      sut_ = make_octomap_backend({bounds, 30.0});
+      sut_ = make_octomap_backend({.bounds_W = bounds});
     }
     scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)}, {Vector3(8, -2, 0), Vector3(12, 2, 12)}};
   }

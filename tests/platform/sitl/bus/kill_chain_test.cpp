@@ -56,7 +56,7 @@ struct Chain {
   /// Armed, and turning at half throttle.
   void take_off() {
     frames(20);
-    ASSERT_EQ(gate.arm(), Status::kOk);
+    ASSERT_EQ(gate.arm_unproven(), Status::kOk);
     frames(20);
     ASSERT_NEAR(throttle, 0.5, 0.001);
   }
@@ -129,10 +129,10 @@ TEST(KillChain, NeedsResetAndArmingAfterAKill) {
   chain.release();
   chain.frames(5);
   ASSERT_EQ(chain.kill_switch.reset(), Status::kOk);
-  chain.gate.reset_kill();
+  ASSERT_EQ(chain.gate.reset_kill(chain.kill_switch), Status::kOk);
   chain.frames(20);
   EXPECT_EQ(chain.throttle, 0.0);
-  ASSERT_EQ(chain.gate.arm(), Status::kOk);
+  ASSERT_EQ(chain.gate.arm(chain.kill_switch), Status::kOk);
   chain.frames(20);
   EXPECT_NEAR(chain.throttle, 0.5, 0.001);
 }

@@ -5,14 +5,14 @@
 #include <vector>
 
 #include "core/geometry/math.hpp"
-#include "platform/flight/decision_pipeline.hpp"
+#include "core/vehicle_model.hpp"
 #include "tests/platform/sitl/vehicle/flight.hpp"
 
 namespace roborun::test {
 namespace {
 
 TEST(ClosedLoop, TheTrackingErrorStaysWithinTheInflation) {
-  const double inflation_m = flight::PipelineConfig{}.inflation_m;
+  const double inflation_m = VehicleModel{}.tracking_error_m;
   double worst_m = 0.0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     Flight flight(seed);

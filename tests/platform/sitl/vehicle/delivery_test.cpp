@@ -31,7 +31,7 @@ class Delivery final : public firmware_if::Motors {
   }
   [[nodiscard]] Status command(const firmware_if::MotorCommand& command) noexcept override {
     thrust_ratio_ = command.thrust_ratio;
-    armed_ = armed_ || gate_.arm() == Status::kOk;
+    armed_ = armed_ || gate_.arm_unproven() == Status::kOk;
     return Status::kOk;
   }
   void step() {
@@ -81,7 +81,7 @@ class Delivery final : public firmware_if::Motors {
   MonotonicTime now_{};
   sitl::Vehicle vehicle_;
   sitl::NavigationSensors sensors_;
-  flight::FlightControl lane_{{}, {}};
+  flight::FlightControl lane_{{}, 0.0025};
   sitl::FakeCan bus_{1'000'000, 3};
   sitl::FakeCanPort& port_ = bus_.port(0);
   firmware_if::TransmitGate gate_{{}, port_};

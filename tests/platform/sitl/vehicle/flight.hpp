@@ -21,7 +21,7 @@ class Flight {
  public:
   static constexpr Nanos kFrame{2'500'000};
   explicit Flight(std::uint64_t seed, const sitl::WindConfig& wind = {})
-      : vehicle_({}, wind, Vector3::Zero(), seed), sensors_({}, seed), lane_({}, {}) {
+      : vehicle_({}, wind, Vector3::Zero(), seed), sensors_({}, seed), lane_({}, seconds(kFrame)) {
     lane_.set_cruise_height(5.0);
     while (!lane_.airborne()) step();
   }

@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "governor/models/stopping_model.hpp"
+#include "core/stopping_model.hpp"
 #include "platform/board/stopping_sweep.hpp"
 
 namespace roborun::app {
@@ -14,7 +14,7 @@ constexpr std::array<double, 7> kSpeeds_mps{0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
 
 TEST(Stopping, TheModelIsNeverShorterThanTheVehicleAndAtMostTwiceAsLong) {
   for (const board::StoppingPoint& p : board::stopping_sweep(kSpeeds_mps, 4, {})) {
-    const double model_m = governor::kSitlQuadrotorStopping.distance_m(p.speed_mps);
+    const double model_m = kSitlQuadrotorStopping.distance_m(p.speed_mps);
     EXPECT_GT(p.distance_m, 0.0);
     EXPECT_GE(model_m, p.distance_m) << p.speed_mps << " m/s";
     EXPECT_LE(model_m, 2.0 * p.distance_m) << p.speed_mps << " m/s";

@@ -13,14 +13,12 @@ constexpr Nanos kFrame{2'500'000};
 
 firmware_if::MotorCommand all(double ratio) { return {{ratio, ratio, ratio, ratio}}; }
 
-double hover_ratio(const VehicleConfig& c) {
-  return c.mass_kg * core::kGravity_mps2 / (4.0 * c.max_thrust_N);
-}
+double hover_ratio(const VehicleModel& c) { return c.mass_kg * core::kGravity_mps2 / (4.0 * c.max_thrust_N); }
 
 WindConfig calm() { return {Vector3::Zero(), 0.0, 3.0}; }
 
 TEST(Vehicle, HoveringCosts480To550Watts) {
-  const VehicleConfig config;
+  const VehicleModel config;
   Vehicle vehicle(config, calm(), Vector3(0.0, 0.0, 10.0), 1);
   ASSERT_EQ(vehicle.command(all(hover_ratio(config))), Status::kOk);
   for (int k = 0; k < 400; ++k) vehicle.step(kFrame);
@@ -29,7 +27,7 @@ TEST(Vehicle, HoveringCosts480To550Watts) {
 }
 
 TEST(Vehicle, AMotorReaches63PercentAfterItsLag) {
-  const VehicleConfig config;
+  const VehicleModel config;
   Vehicle vehicle(config, calm(), Vector3(0.0, 0.0, 10.0), 1);
   (void)vehicle.command(all(1.0));
   for (int k = 0; k < 16; ++k) vehicle.step(kFrame);  // 40 ms
@@ -37,7 +35,7 @@ TEST(Vehicle, AMotorReaches63PercentAfterItsLag) {
 }
 
 TEST(Vehicle, DragGivesFreeFallAnEnd) {
-  const VehicleConfig config;
+  const VehicleModel config;
   Vehicle vehicle(config, calm(), Vector3(0.0, 0.0, 5000.0), 1);
   for (int k = 0; k < 400 * 40; ++k) vehicle.step(kFrame);
   // m g = linear v + quadratic v^2
@@ -49,7 +47,7 @@ TEST(Vehicle, DragGivesFreeFallAnEnd) {
 }
 
 TEST(Vehicle, TheWindCarriesItAway) {
-  const VehicleConfig config;
+  const VehicleModel config;
   Vehicle vehicle(config, {Vector3(3.0, 0.0, 0.0), 0.0, 3.0}, Vector3(0.0, 0.0, 50.0), 1);
   (void)vehicle.command(all(hover_ratio(config)));
   for (int k = 0; k < 400 * 60; ++k) vehicle.step(kFrame);
@@ -57,7 +55,7 @@ TEST(Vehicle, TheWindCarriesItAway) {
 }
 
 TEST(Vehicle, StandsOnTheGroundUntilItsThrustExceedsItsWeight) {
-  const VehicleConfig config;
+  const VehicleModel config;
   Vehicle vehicle(config, {}, Vector3::Zero(), 1);
   (void)vehicle.command(all(0.9 * hover_ratio(config)));
   for (int k = 0; k < 400; ++k) vehicle.step(kFrame);
@@ -69,7 +67,7 @@ TEST(Vehicle, StandsOnTheGroundUntilItsThrustExceedsItsWeight) {
 }
 
 TEST(Vehicle, AnEmptyBatteryGivesNoThrust) {
-  VehicleConfig config;
+  VehicleModel config;
   config.battery_J = 1000.0;
   Vehicle vehicle(config, calm(), Vector3(0.0, 0.0, 100.0), 1);
   (void)vehicle.command(all(hover_ratio(config)));
@@ -80,7 +78,7 @@ TEST(Vehicle, AnEmptyBatteryGivesNoThrust) {
 }
 
 TEST(Vehicle, RefusesACommandOutOfRangeAndKeepsTheOneBefore) {
-  const VehicleConfig config;
+  const VehicleModel config;
   Vehicle vehicle(config, calm(), Vector3(0.0, 0.0, 10.0), 1);
   ASSERT_EQ(vehicle.command(all(0.4)), Status::kOk);
   for (const double bad : {-0.1, 1.1, std::numeric_limits<double>::quiet_NaN()})

@@ -1,13 +1,21 @@
 /// How far the vehicle travels until it stands. Source: RoboRun Eq. 2 (printed there with the wrong sign).
 #pragma once
 
-namespace roborun::governor {
+#include "core/range.hpp"
+#include "firmware_if/status.hpp"
+
+namespace roborun {
 
 /// d_stop(v) = quadratic v^2 + linear v + constant, at least 0.
 struct StoppingModel {
-  double quadratic_s2pm{};
-  double linear_s{};
-  double constant_m{};
+  double quadratic_s2pm{};  ///< [0, 10]. Braking with a m/s2 at once: 1 / 2a.
+  double linear_s{};        ///< [0, 10]. The time until the brake bites.
+  double constant_m{};      ///< [-10, 10]. A fit may be negative at standstill.
+  [[nodiscard]] constexpr Status validate() const noexcept {
+    const bool ok = core::within(quadratic_s2pm, 0.0, 10.0) && core::within(linear_s, 0.0, 10.0) &&
+                    core::within(constant_m, -10.0, 10.0);
+    return ok ? Status::kOk : Status::kInvalidArgument;
+  }
 
   /// 0 for a negative speed; NaN gives +infinity: an unknown speed never stops. RT-safe: O(1).
   [[nodiscard]] double distance_m(double speed_mps) const noexcept;
@@ -23,4 +31,4 @@ inline constexpr StoppingModel kRoborunStopping{0.05494, 0.3549, -0.2038};
 /// 3.772, 5.284 m (tests/platform/sitl/vehicle/stopping_test.cpp).
 inline constexpr StoppingModel kSitlQuadrotorStopping{0.262, 0.03, 0.15};
 
-}  // namespace roborun::governor
+}  // namespace roborun

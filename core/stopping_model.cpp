@@ -1,10 +1,10 @@
-#include "governor/models/stopping_model.hpp"
+#include "core/stopping_model.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-namespace roborun::governor {
+namespace roborun {
 
 double StoppingModel::distance_m(double speed_mps) const noexcept {
   if (std::isnan(speed_mps)) return std::numeric_limits<double>::infinity();
@@ -12,4 +12,4 @@ double StoppingModel::distance_m(double speed_mps) const noexcept {
   return std::max((quadratic_s2pm * v + linear_s) * v + constant_m, 0.0);
 }
 
-}  // namespace roborun::governor
+}  // namespace roborun

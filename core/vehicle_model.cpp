@@ -1,0 +1,51 @@
+#include "core/vehicle_model.hpp"
+
+#include "core/geometry/math.hpp"
+
+namespace roborun {
+namespace {
+
+constexpr double kStopShape = 35.0 / 32.0;  // of a minimum-snap stop, in v^2/a
+constexpr double kJerkShape = 0.4293;       // of what the jerk limit adds at most, in a/j v
+constexpr double kLeastThrust_ratio = 1.2;  // below it there is no thrust left to tilt with in wind
+
+}  // namespace
+
+StoppingModel stopping_model(const VehicleModel& v) noexcept {
+  if (v.measured_stopping) return *v.measured_stopping;
+  return {kStopShape / v.acceleration_mps2, kJerkShape * v.acceleration_mps2 / v.jerk_mps3 + v.motor_lag_s,
+          v.tracking_error_m};
+}
+
+double tilt_acceleration_mps2(const VehicleModel& v) noexcept {
+  const core::SinCos tilt = core::sin_cos(v.tilt_rad);
+  return core::kGravity_mps2 * tilt.sin / tilt.cos;
+}
+
+double thrust_to_weight_ratio(const VehicleModel& v) noexcept {
+  return 4.0 * v.max_thrust_N / (v.mass_kg * core::kGravity_mps2);
+}
+
+double drag_mps2(const VehicleModel& v, double speed_mps) noexcept {
+  return (v.drag_linear_Nspm + v.drag_quadratic_Ns2pm2 * speed_mps) * speed_mps / v.mass_kg;
+}
+
+const char* cannot_fly(const VehicleModel& v, double visible_m) noexcept {
+  if (thrust_to_weight_ratio(v) < kLeastThrust_ratio)
+    return "cannot hover: four times propulsion.max_thrust_N must be at least 1.2 times its weight";
+  if (v.acceleration_mps2 > tilt_acceleration_mps2(v))
+    return "limits.acceleration_mps2 is more than its tilt gives: must be at most g tan(limits.tilt_rad)";
+  const core::SinCos tilt = core::sin_cos(v.tilt_rad);
+  if (thrust_to_weight_ratio(v) * tilt.cos < 1.0)
+    return "cannot hold its height at limits.tilt_rad: must have thrust-to-weight of at least 1 / cos(tilt)";
+  if (drag_mps2(v, v.speed_mps) > tilt_acceleration_mps2(v))
+    return "cannot fly as fast as limits.speed_mps: its drag there must be below g tan(limits.tilt_rad)";
+  // Not as slowly as the slowest useful flight: as fast as its limit says is a question of the world.
+  constexpr double kSlow_mps = 0.5;
+  if (stopping_model(v).distance_m(kSlow_mps) + planned_radius_m(v) >= visible_m)
+    return "cannot stop within what it sees: at 0.5 m/s its stop and its radius must be below the shortest "
+           "range";
+  return nullptr;
+}
+
+}  // namespace roborun

@@ -1,0 +1,163 @@
+#include "platform/app/vehicle_command.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "core/geometry/math.hpp"
+#include "governor/policy/governor.hpp"
+#include "platform/board/backends.hpp"
+#include "platform/flight/flight_system.hpp"
+#include "platform/input/input_error.hpp"
+#include "platform/mission/mission_config.hpp"
+#include "platform/vehicle/vehicle_file.hpp"
+
+namespace roborun::app {
+namespace {
+
+struct VehicleOptions {
+  std::string file;
+  bool json{false};
+};
+
+/// What follows from a vehicle.
+struct Consequences {
+  double thrust_to_weight_ratio{}, hover_ratio{}, tilt_mps2{};
+  std::array<std::array<double, 2>, 4> stop{};  ///< Speed, distance.
+  double range_m{};                             ///< Of its sensors, the shortest.
+  double blind_deg{};                           ///< Widest angle to the nearest direction that is seen.
+  bool looks_forward{};
+  double fastest_mps{};  ///< That can stop within what is seen, thinking for 0.2 s.
+  double gap_m{};        ///< The narrowest that plans go through.
+  std::size_t bytes{};   ///< In a world of 100 x 100 x 10 m.
+};
+
+Consequences consequences_of(const vehicle::Vehicle& vehicle) {
+  const VehicleModel& v = vehicle.model;
+  mission::MissionConfig config;
+  mission::set_vehicle(config, vehicle);
+  config.flight.bounds_W = {{0.0, 0.0, 0.0}, {100.0, 100.0, 10.0}};
+  Consequences c;
+  c.thrust_to_weight_ratio = thrust_to_weight_ratio(v);
+  c.hover_ratio = 1.0 / c.thrust_to_weight_ratio;
+  c.tilt_mps2 = tilt_acceleration_mps2(v);
+  const StoppingModel stop = stopping_model(v);
+  for (std::size_t i = 0; i < c.stop.size(); ++i) {
+    const double speed_mps = v.speed_mps * static_cast<double>(i + 1) / static_cast<double>(c.stop.size());
+    c.stop[i] = {speed_mps, stop.distance_m(speed_mps)};
+  }
+  const board::ImageLimits images = image_limits(config);
+  const SensorRig rig = sitl::rig_of(config.simulator);
+  describe_sensors(rig, config.flight);
+  c.range_m = config.flight.camera_range_m;
+  c.blind_deg = widest_blind_angle_rad(rig) * 180.0 / core::kPi;
+  c.looks_forward = looks_forward(rig);
+  governor::GovernorConfig g;
+  g.stopping = stop;
+  constexpr double kThinking_s = 0.2;
+  c.fastest_mps = governor::Governor(g).safe_speed_mps(c.range_m - planned_radius_m(v), kThinking_s);
+  c.gap_m = 2.0 * planned_radius_m(v);
+  c.bytes = flight::FlightSystem::arena_bytes(config.flight) +
+            board::backend_bytes(map_bounds_W(config.flight), images) + sizeof(flight::FlightSystem);
+  return c;
+}
+
+/// What it cannot do, one line each.
+std::vector<std::string> shortcomings_of(const vehicle::Vehicle& vehicle, const Consequences& c) {
+  std::vector<std::string> lines;
+  const VehicleModel& v = vehicle.model;
+  if (c.fastest_mps < v.speed_mps)
+    lines.push_back(
+        fmt::format("cannot use its {:.1f} m/s: what it sees allows {:.1f} m/s", v.speed_mps, c.fastest_mps));
+  if (!c.looks_forward)
+    lines.emplace_back("cannot see where it flies: nothing looks within 45 degrees of forward");
+  if (c.thrust_to_weight_ratio < 1.6)
+    lines.push_back(
+        fmt::format("has little thrust for wind: thrust-to-weight {:.2f}", c.thrust_to_weight_ratio));
+  lines.push_back(fmt::format("cannot pass gaps narrower than {:.2f} m", c.gap_m));
+  return lines;
+}
+
+int check(const VehicleOptions& options) {
+  const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.file);
+  const Consequences c = consequences_of(vehicle);
+  const std::vector<std::string> cannot = shortcomings_of(vehicle, c);
+  if (options.json) {
+    nlohmann::ordered_json j = {{"name", vehicle.name},
+                                {"about", vehicle.about},
+                                {"thrust_to_weight_ratio", c.thrust_to_weight_ratio},
+                                {"hover_throttle_ratio", c.hover_ratio},
+                                {"tilt_acceleration_mps2", c.tilt_mps2},
+                                {"stopping", nlohmann::ordered_json::array()},
+                                {"range_m", c.range_m},
+                                {"blind_deg", c.blind_deg},
+                                {"fastest_mps", c.fastest_mps},
+                                {"narrowest_gap_m", c.gap_m},
+                                {"bytes", c.bytes},
+                                {"cannot", cannot}};
+    for (const auto& [speed_mps, distance_m] : c.stop)
+      j["stopping"].push_back({{"speed_mps", speed_mps}, {"distance_m", distance_m}});
+    fmt::print("{}\n", j.dump());
+    return 0;
+  }
+  fmt::print("{}: {}\n\n", vehicle.name, vehicle.about);
+  fmt::print("thrust to weight     {:.2f}, hovers at {:.0f} % of full throttle\n", c.thrust_to_weight_ratio,
+             100.0 * c.hover_ratio);
+  fmt::print("sideways             {:.1f} m/s2 at its tilt limit of {:.0f} degrees\n", c.tilt_mps2,
+             vehicle.model.tilt_rad * 180.0 / core::kPi);
+  fmt::print("stops within        ");
+  for (const auto& [speed_mps, distance_m] : c.stop)
+    fmt::print(" {:.2f} m from {:.1f} m/s{}", distance_m, speed_mps,
+               speed_mps < vehicle.model.speed_mps ? "," : "\n");
+  fmt::print("sees                 {:.0f} m: enough for {:.1f} m/s, when it thinks for 0.2 s\n", c.range_m,
+             c.fastest_mps);
+  fmt::print("widest blind angle   {:.0f} degrees\n", c.blind_deg);
+  fmt::print("memory               {:.1f} MiB in a world of 100 x 100 x 10 m\n",
+             static_cast<double>(c.bytes) / 1048576.0);
+  for (const std::string& line : cannot) fmt::print("it                   {}\n", line);
+  return 0;
+}
+
+int list(const VehicleOptions& options) {
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  for (const std::string& name : vehicle::shipped_vehicles()) {
+    const vehicle::Vehicle v = vehicle::load_vehicle(name);
+    if (options.json)
+      all.push_back({{"name", v.name}, {"about", v.about}});
+    else
+      fmt::print("{:<8} {}\n", v.name, v.about);
+  }
+  if (options.json) fmt::print("{}\n", all.dump());
+  return 0;
+}
+
+}  // namespace
+
+void add_vehicle_command(CLI::App& app, std::function<int()>& run) {
+  const auto options = std::make_shared<VehicleOptions>();
+  CLI::App* command =
+      app.add_subcommand("vehicle", "Vehicles: which ship, and what follows from a vehicle file");
+  command->footer(
+      "Examples:\n"
+      "  roborun vehicle list\n"
+      "  roborun vehicle check x500\n"
+      "  roborun vehicle check mine.toml        a copy of platform/vehicle/x500.toml with your numbers\n"
+      "  roborun fly --vehicle mine.toml\n\n"
+      "All keys with unit, range and meaning: roborun config. Exit code: 0, or 2: the file is wrong, or its "
+      "vehicle cannot fly.");
+  command->require_subcommand(1);
+  CLI::App* list_app = command->add_subcommand("list", "The vehicles that ship, paper first");
+  list_app->add_flag("--json", options->json, "One JSON array on standard output, nothing else");
+  list_app->callback([options, &run] { run = [options] { return list(*options); }; });
+  CLI::App* check_app = command->add_subcommand(
+      "check", "Stopping distances, thrust, what it sees, memory, and what it cannot do");
+  check_app->add_option("FILE", options->file, "A vehicle file, or the name of a shipped vehicle")
+      ->required();
+  check_app->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
+  check_app->callback([options, &run] { run = [options] { return check(*options); }; });
+}
+
+}  // namespace roborun::app

@@ -1,0 +1,14 @@
+/// The vehicle files of platform/vehicle, as text in the program: CMake writes the source.
+#pragma once
+
+#include <array>
+
+namespace roborun::vehicle {
+
+struct ShippedVehicle {
+  const char* name;
+  const char* text;
+};
+extern const std::array<ShippedVehicle, 5> kShippedVehicles;
+
+}  // namespace roborun::vehicle
