@@ -28,9 +28,11 @@ struct Consequences {
   double thrust_to_weight_ratio{}, hover_ratio{}, tilt_mps2{};
   std::array<std::array<double, 2>, 4> stop{};  ///< Speed, distance.
   double range_m{};                             ///< Of its sensors, the shortest.
-  double fastest_mps{};                         ///< That can stop within what is seen, thinking for 0.2 s.
-  double gap_m{};                               ///< The narrowest that plans go through.
-  std::size_t bytes{};                          ///< In a world of 100 x 100 x 10 m.
+  double blind_deg{};                           ///< Widest angle to the nearest direction that is seen.
+  bool looks_forward{};
+  double fastest_mps{};  ///< That can stop within what is seen, thinking for 0.2 s.
+  double gap_m{};        ///< The narrowest that plans go through.
+  std::size_t bytes{};   ///< In a world of 100 x 100 x 10 m.
 };
 
 Consequences consequences_of(const vehicle::Vehicle& vehicle) {
@@ -48,14 +50,18 @@ Consequences consequences_of(const vehicle::Vehicle& vehicle) {
     c.stop[i] = {speed_mps, stop.distance_m(speed_mps)};
   }
   const board::ImageLimits images = image_limits(config);
-  c.range_m = images.range_m;
+  const SensorRig rig = sitl::rig_of(config.simulator);
+  describe_sensors(rig, config.flight);
+  c.range_m = config.flight.camera_range_m;
+  c.blind_deg = widest_blind_angle_rad(rig) * 180.0 / core::kPi;
+  c.looks_forward = looks_forward(rig);
   governor::GovernorConfig g;
   g.stopping = stop;
   constexpr double kThinking_s = 0.2;
   c.fastest_mps = governor::Governor(g).safe_speed_mps(c.range_m - planned_radius_m(v), kThinking_s);
   c.gap_m = 2.0 * planned_radius_m(v);
-  c.bytes = flight::FlightSystem::arena_bytes() + board::backend_bytes(map_bounds_W(config.flight), images) +
-            sizeof(flight::FlightSystem);
+  c.bytes = flight::FlightSystem::arena_bytes(config.flight) +
+            board::backend_bytes(map_bounds_W(config.flight), images) + sizeof(flight::FlightSystem);
   return c;
 }
 
@@ -66,6 +72,8 @@ std::vector<std::string> shortcomings_of(const vehicle::Vehicle& vehicle, const 
   if (c.fastest_mps < v.speed_mps)
     lines.push_back(
         fmt::format("cannot use its {:.1f} m/s: what it sees allows {:.1f} m/s", v.speed_mps, c.fastest_mps));
+  if (!c.looks_forward)
+    lines.emplace_back("cannot see where it flies: nothing looks within 45 degrees of forward");
   if (c.thrust_to_weight_ratio < 1.6)
     lines.push_back(
         fmt::format("has little thrust for wind: thrust-to-weight {:.2f}", c.thrust_to_weight_ratio));
@@ -85,6 +93,7 @@ int check(const VehicleOptions& options) {
                                 {"tilt_acceleration_mps2", c.tilt_mps2},
                                 {"stopping", nlohmann::ordered_json::array()},
                                 {"range_m", c.range_m},
+                                {"blind_deg", c.blind_deg},
                                 {"fastest_mps", c.fastest_mps},
                                 {"narrowest_gap_m", c.gap_m},
                                 {"bytes", c.bytes},
@@ -105,6 +114,7 @@ int check(const VehicleOptions& options) {
                speed_mps < vehicle.model.speed_mps ? "," : "\n");
   fmt::print("sees                 {:.0f} m: enough for {:.1f} m/s, when it thinks for 0.2 s\n", c.range_m,
              c.fastest_mps);
+  fmt::print("widest blind angle   {:.0f} degrees\n", c.blind_deg);
   fmt::print("memory               {:.1f} MiB in a world of 100 x 100 x 10 m\n",
              static_cast<double>(c.bytes) / 1048576.0);
   for (const std::string& line : cannot) fmt::print("it                   {}\n", line);

@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "platform/board/plugin_loader.hpp"
 #include "platform/input/input_error.hpp"
 #include "stages/perception/brick_map.hpp"
+#include "stages/perception/cloud_images.hpp"
 #include "stages/perception/octomap_backend/octomap_backend.hpp"
 #include "stages/planning/ompl_backend/ompl_backend.hpp"
 #include "stages/planning/rrt_star.hpp"
@@ -15,7 +18,10 @@ namespace {
 stages::BrickMap::Config brick_config(const Aabb& map_bounds_W, const ImageLimits& images) {
   stages::BrickMap::Config config;
   config.bounds_W = map_bounds_W;
-  config.max_image_side = images.side_pixels;
+  config.max_image_width = images.width;
+  config.max_image_height = images.height;
+  config.max_frames = images.frames;
+  config.all_around_frames = images.all_around_frames;
   config.vehicle_radius_m = images.vehicle_radius_m;
   if (config.validate() != Status::kOk) {
     throw InputError("map: the world is too large for the map: at most 4 million bricks of 4.8 m");
@@ -53,6 +59,25 @@ std::unique_ptr<stages::Planner> make_planner(const std::string& name, const Par
 
 bool uses_plugin(const BackendNames& names) noexcept {
   return is_plugin(names.map) || is_plugin(names.planner);
+}
+
+ImageLimits image_limits(const SensorRig& rig, const VehicleModel& vehicle) noexcept {
+  ImageLimits limits;
+  limits.vehicle_radius_m = vehicle.radius_m;
+  limits.frames = rig.cameras.size();
+  limits.all_around_frames = cameras_see_all_around(rig) ? rig.cameras.size() : 0;
+  for (const CameraSpec& camera : rig.cameras) {
+    limits.width = std::max(limits.width, camera.width);
+    limits.height = std::max(limits.height, camera.height);
+    limits.range_m = std::max(limits.range_m, camera.range_m);
+  }
+  for (const LidarSpec& lidar : rig.lidars) {
+    limits.frames = std::max(limits.frames, stages::CloudImages::kImages);
+    limits.width = std::max(limits.width, cloud_pixels(lidar));
+    limits.height = std::max(limits.height, cloud_pixels(lidar));
+    limits.range_m = std::max(limits.range_m, lidar.range_m);
+  }
+  return limits;
 }
 
 std::size_t backend_bytes(const Aabb& map_bounds_W, const ImageLimits& images) {

@@ -7,6 +7,8 @@
 
 #include "core/geometry/vector.hpp"
 #include "core/memory/arena.hpp"
+#include "core/sensor_rig.hpp"
+#include "core/vehicle_model.hpp"
 #include "governor/policy/decision_policy.hpp"
 #include "platform/board/part_request.hpp"
 #include "platform/flight/flight_config.hpp"
@@ -29,6 +31,8 @@ struct OwnParts {
   std::function<std::unique_ptr<governor::DecisionPolicy>(const flight::FlightConfig&)> policy{};
   [[nodiscard]] bool empty() const noexcept { return !map && !planner && !policy; }
 };
+/// Of what this rig delivers.
+[[nodiscard]] ImageLimits image_limits(const SensorRig& rig, const VehicleModel& vehicle) noexcept;
 
 [[nodiscard]] bool uses_plugin(const BackendNames& names) noexcept;
 

@@ -31,7 +31,8 @@ constexpr int kVolumes = 8;
 constexpr double kPoseStep_m = 1.5;
 constexpr double kMapReach_m = 40.0;
 constexpr double kPlannerShare = 0.4;
-constexpr ImageLimits kImages{sitl::DepthCameraConfig{}.pixels, sitl::DepthCameraConfig{}.range_m};
+constexpr ImageLimits kImages{sitl::DepthCameraConfig{}.pixels, sitl::DepthCameraConfig{}.pixels,
+                              sitl::DepthCameraConfig{}.range_m};
 constexpr std::array<const char*, 3> kStageName{"map", "export", "planner"};
 
 /// Seconds of this thread's own processor time.

@@ -66,7 +66,8 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   core::Work work;
   const std::uint64_t refused = cloud_.counters().frames_refused;
   const bool sees_all = cloud_.step(in.frames, 0, budget, work) == Status::kOk &&
-                        cloud_.counters().frames_refused == refused && in.frames.size() >= config_.cameras;
+                        cloud_.counters().frames_refused == refused && in.frames.size() >= config_.images &&
+                        config_.sees_all_around;
   const double r_m = radius_m();
   const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m),
                         config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
@@ -96,6 +97,18 @@ void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noex
     charge(core::StageId::kGovernor, {}, out);
 }
 
+Vector3 DecisionPipeline::assumed_half_m(const DecisionInput& in) const noexcept {
+  constexpr double kMost_m = 5.0;
+  const MonotonicTime climbed = in.committed->start_time + from_seconds(in.committed->duration_s());
+  if (config_.sees_all_around || !in.climbing || in.now < climbed) return Vector3::Zero();
+  // What has to be free around the start of a plan, and as far as the sensors see less of it than that while the
+  // vehicle turns: at a distance of d they see d * ratio up and down.
+  const double half_m = radius_m() + kCornerRoom_m + kFinestCell_m;
+  const double reach_m =
+      std::min((half_m + kFinestCell_m) / config_.level_view_ratio + kFinestCell_m, kMost_m);
+  return {std::max(reach_m, half_m), std::max(reach_m, half_m), half_m};
+}
+
 void DecisionPipeline::integrate(const DecisionInput& in, DecisionOutput& out) noexcept {
   core::StaticVector<Vector3, kTrajectoryPoints> trajectory_W;
   (void)trajectory_W.push_back(in.p_WB);
@@ -106,15 +119,28 @@ void DecisionPipeline::integrate(const DecisionInput& in, DecisionOutput& out) n
   }
   const OperatingPoint& point = out.decision.point;
   core::MeteredBudget budget = budget_of(core::StageId::kMap, out);
-  stages::IntegrationResult integrated;
   const MotionWatch::Places moved_W = motion_.places_W(in.now);
-  (void)map_.integrate({in.frames,
-                        point.p0_level,
-                        point.v0_m3,
-                        {trajectory_W.begin(), trajectory_W.size()},
-                        {moved_W.begin(), moved_W.size()}},
-                       budget, integrated);
-  charge(core::StageId::kMap, integrated.work, out);
+  stages::IntegrationRequest request{in.frames,
+                                     point.p0_level,
+                                     point.v0_m3,
+                                     {trajectory_W.begin(), trajectory_W.size()},
+                                     {moved_W.begin(), moved_W.size()}};
+  request.assumed_half_m = assumed_half_m(in);
+  core::Work work;
+  std::size_t first = 0;
+  const std::size_t scans = std::max<std::size_t>(in.scans.size(), 1);
+  for (std::size_t i = 0; i < scans; ++i) {
+    const std::size_t count = in.scans.empty() ? in.frames.size() : in.scans[i];
+    request.frames = in.frames.subspan(first, count);
+    request.volume_m3 = point.v0_m3 - work.volume_m3;
+    first += count;
+    stages::IntegrationResult integrated;
+    (void)map_.integrate(request, budget, integrated);
+    work.units += integrated.work.units;
+    work.volume_m3 += integrated.work.volume_m3;
+    work.level = integrated.work.level;
+  }
+  charge(core::StageId::kMap, work, out);
 }
 
 void DecisionPipeline::check_committed(const DecisionInput& in, DecisionOutput& out) noexcept {

@@ -11,10 +11,13 @@
 #include "core/executive/stage_meter.hpp"
 #include "core/geometry/fence.hpp"
 #include "core/geometry/vector.hpp"
+#include "core/memory/static_vector.hpp"
+#include "core/sensor_rig.hpp"
 #include "core/trajectory.hpp"
 #include "core/vehicle_model.hpp"
 #include "governor/policy/decision_policy.hpp"
 #include "platform/flight/motion_watch.hpp"
+#include "stages/perception/cloud_images.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/perception/point_cloud.hpp"
 #include "stages/perception/space_profiler.hpp"
@@ -26,16 +29,24 @@ namespace roborun::flight {
 struct PipelineConfig {
   Aabb flight_bounds_W{};  ///< The vehicle's centre stays inside.
   VehicleModel vehicle{};
-  std::size_t cameras{6};  ///< What fewer images do not show may be anything.
-  double horizon_m{24.0};  ///< No way-point farther than this: one metre less than the cameras see.
-  core::Fence fence{};     ///< What it forbids is occupied for planner and smoother.
+  std::size_t images{6};  ///< Of all sensors: what fewer images do not show may be anything.
+  /// The sensors together see every direction; false: what they do not see may be anything.
+  bool sees_all_around{true};
+  double level_view_ratio{1.0};  ///< FlightConfig::level_view_ratio.
+  double horizon_m{24.0};        ///< No way-point farther than this: one metre less than the cameras see.
+  core::Fence fence{};           ///< What it forbids is occupied for planner and smoother.
   Nanos minor_frame{core::kMinorFrame};  ///< Of the flight lane: no stop takes over sooner.
   Aabb map_bounds_W{};  ///< What the map stores; its heights limit what counts as seen volume.
 };
 
+/// Images of one decision: each camera's, and six of each LiDAR's cloud.
+inline constexpr std::size_t kMostImages = kMostCameras + kMostLidars * stages::CloudImages::kImages;
+
 struct DecisionInput {
   MonotonicTime now{};  ///< Start of the decision.
   std::span<const stages::PosedDepthFrame> frames{};
+  /// How many of the frames, in their order, go into the map together; empty: all. A cloud's go alone.
+  core::StaticVector<std::size_t, 1 + kMostLidars> scans{};
   const Trajectory* committed{};  ///< What the flight lane flies now.
   bool climbing{false};           ///< To the first hover: looks around as precisely as it can.
   Vector3 p_WB = Vector3::Zero();
@@ -110,6 +121,8 @@ class DecisionPipeline {
   [[nodiscard]] bool went_straight(const DecisionInput& in) const noexcept;
   void govern(const DecisionInput& in, DecisionOutput& out) noexcept;
   void integrate(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// Half edges of the box that a vehicle at the top of its climb takes to be free (IntegrationRequest).
+  [[nodiscard]] Vector3 assumed_half_m(const DecisionInput& in) const noexcept;
   /// What is flown, on the map that just got its images.
   void check_committed(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// The stop that takes over as soon as it can, if it stays free until `free_until` at least: a straight

@@ -19,6 +19,18 @@ constexpr Nanos kLatestStop{20'000'000};   // 12 cm at 6 m/s
 
 }  // namespace
 
+DecisionProgram::DecisionProgram(const Config& config, DecisionPipeline& pipeline,
+                                 std::span<firmware_if::DepthCamera* const> cameras, LaneMail& mail,
+                                 std::span<firmware_if::Lidar* const> lidars,
+                                 const std::array<std::uint16_t, kMostLidars>& cloud_pixels,
+                                 core::Arena& arena) noexcept
+    : config_(config), pipeline_(pipeline), mail_(mail) {
+  for (firmware_if::DepthCamera* camera : cameras) (void)cameras_.push_back(camera);
+  for (firmware_if::Lidar* lidar : lidars) (void)lidars_.push_back(lidar);
+  for (std::size_t i = 0; i < kMostLidars; ++i)
+    if (cloud_pixels[i] > 0) clouds_[i].emplace(stages::CloudImages::Config{cloud_pixels[i]}, arena);
+}
+
 void DecisionProgram::publish(MonotonicTime due) noexcept {
   report_.heard = true;
   report_.due = due;
@@ -46,30 +58,61 @@ void DecisionProgram::judge() noexcept {
   refusals_before_ = refusals;
 }
 
-void DecisionProgram::look(const stages::PastStates& past, MonotonicTime now) noexcept {
-  std::array<std::size_t, kMostCameras> camera_of{};
-  frames_.clear();
+void DecisionProgram::look_through_cameras(const stages::PastStates& past) noexcept {
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     stages::PosedDepthFrame posed;
     Pose X_WB;
     if (cameras_[i]->read(posed.frame) != Status::kOk || past.pose_at(posed.frame.stamp, X_WB) != Status::kOk)
       continue;
     posed.X_WC = core::camera_pose(X_WB, cameras_[i]->mount());
-    camera_of[frames_.size()] = i;
+    posed.p_BC_W = posed.X_WC.p_RT - X_WB.p_RT;
+    sensor_of_[frames_.size()] = i;
     (void)frames_.push_back(posed);
   }
+}
+
+void DecisionProgram::look_through_lidar(std::size_t lidar, const stages::PastStates& past) noexcept {
+  firmware_if::LidarSweep sweep;
+  Pose X_WB;
+  if (!clouds_[lidar] || lidars_[lidar]->read(sweep) != Status::kOk ||
+      past.pose_at(sweep.stamp, X_WB) != Status::kOk)
+    return;
+  const Pose X_WL = core::camera_pose(X_WB, lidars_[lidar]->mount());
+  const Vector3 p_BL_W = X_WL.p_RT - X_WB.p_RT;
+  stages::CloudImages& images = *clouds_[lidar];
+  if (images.make({sweep.points_L_m, sweep.stamp, sweep.range_m, X_WL, p_BL_W, sweep.range_min_m}) !=
+      Status::kOk)
+    return;
+  for (const stages::PosedDepthFrame& posed : images.frames()) {
+    sensor_of_[frames_.size()] = kMostCameras + lidar;
+    (void)frames_.push_back(posed);
+  }
+}
+
+void DecisionProgram::look(const stages::PastStates& past, MonotonicTime now) noexcept {
+  frames_.clear();
+  look_through_cameras(past);
+  for (std::size_t i = 0; i < lidars_.size(); ++i) look_through_lidar(i, past);
   // The same judge as in point cloud and map: what it refuses counts as not seen, for the failsafe too.
   guard_.begin({frames_.begin(), frames_.size()});
   std::size_t kept = 0;
+  in_.scans.clear();
+  std::array<std::size_t, 1 + kMostLidars> scan{};
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     if (guard_.check(frames_[i]) != Status::kOk) continue;
-    last_usable_[camera_of[i]] = frames_[i].frame.stamp;
+    const std::size_t sensor = sensor_of_[i];
+    last_usable_[sensor] = frames_[i].frame.stamp;
+    ++scan[sensor < kMostCameras ? 0 : 1 + sensor - kMostCameras];
     frames_[kept++] = frames_[i];
   }
   frames_.truncate(kept);
+  for (const std::size_t images : scan)
+    if (images > 0) (void)in_.scans.push_back(images);
   report_.depth_age_s = 0.0;
   for (std::size_t i = 0; i < cameras_.size(); ++i)
     report_.depth_age_s = std::max(report_.depth_age_s, seconds(now - last_usable_[i]));
+  for (std::size_t i = 0; i < lidars_.size(); ++i)
+    report_.depth_age_s = std::max(report_.depth_age_s, seconds(now - last_usable_[kMostCameras + i]));
 }
 
 void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {

@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "core/executive/frame_table.hpp"
@@ -11,9 +12,11 @@
 #include "core/geometry/fence.hpp"
 #include "core/memory/static_vector.hpp"
 #include "firmware_if/depth_camera.hpp"
+#include "firmware_if/lidar.hpp"
 #include "platform/flight/decision_pipeline.hpp"
 #include "platform/flight/flight_config.hpp"
 #include "platform/flight/lane_mail.hpp"
+#include "stages/perception/cloud_images.hpp"
 
 namespace roborun::flight {
 
@@ -26,10 +29,9 @@ class DecisionProgram final : public core::LaneProgram {
     Nanos minor_frame{core::kMinorFrame};  ///< Of the flight lane.
   };
   DecisionProgram(const Config& config, DecisionPipeline& pipeline,
-                  std::span<firmware_if::DepthCamera* const> cameras, LaneMail& mail) noexcept
-      : config_(config), pipeline_(pipeline), mail_(mail) {
-    for (firmware_if::DepthCamera* camera : cameras) (void)cameras_.push_back(camera);
-  }
+                  std::span<firmware_if::DepthCamera* const> cameras, LaneMail& mail,
+                  std::span<firmware_if::Lidar* const> lidars,
+                  const std::array<std::uint16_t, kMostLidars>& cloud_pixels, core::Arena& arena) noexcept;
   void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override;
 
   /// No more decisions from here on; any thread.
@@ -42,9 +44,12 @@ class DecisionProgram final : public core::LaneProgram {
 
  private:
   void gather(core::LaneExecutive& lane) noexcept;
-  /// Reads all cameras: frames_ are the images that may be used, and the depth's age is that of the camera
+  /// Reads all sensors: frames_ are the images that may be used, and the depth's age is that of the sensor
   /// that is worst off.
   void look(const stages::PastStates& past, MonotonicTime now) noexcept;
+  /// Adds the newest images of all cameras, or those of a LiDAR's newest sweep.
+  void look_through_cameras(const stages::PastStates& past) noexcept;
+  void look_through_lidar(std::size_t lidar, const stages::PastStates& past) noexcept;
   void publish(MonotonicTime due) noexcept;
   void choose_site() noexcept;
   void judge() noexcept;
@@ -58,7 +63,10 @@ class DecisionProgram final : public core::LaneProgram {
   DecisionPipeline& pipeline_;
   core::StaticVector<firmware_if::DepthCamera*, kMostCameras> cameras_;
   LaneMail& mail_;
-  core::StaticVector<stages::PosedDepthFrame, kMostCameras> frames_;
+  core::StaticVector<firmware_if::Lidar*, kMostLidars> lidars_;
+  std::array<std::optional<stages::CloudImages>, kMostLidars> clouds_{};
+  core::StaticVector<stages::PosedDepthFrame, kMostImages> frames_;
+  std::array<std::size_t, kMostImages> sensor_of_{};  ///< By frame: a camera, or kMostCameras + a LiDAR.
   DecisionInput in_{};
   DecisionOutput out_{};
   std::uint64_t decisions_{0};
@@ -67,7 +75,7 @@ class DecisionProgram final : public core::LaneProgram {
   Trajectory handed_over_{};
   DecisionReport report_{};
   stages::FrameGuard guard_{};
-  std::array<MonotonicTime, kMostCameras> last_usable_{};  ///< By camera.
+  std::array<MonotonicTime, kMostCameras + kMostLidars> last_usable_{};  ///< By sensor.
   std::uint64_t refusals_before_{0};
 };
 

@@ -9,14 +9,20 @@
 #include "core/executive/frame_table.hpp"
 #include "core/geometry/fence.hpp"
 #include "core/geometry/vector.hpp"
+#include "core/sensor_rig.hpp"
 #include "core/vehicle_model.hpp"
 #include "firmware_if/time.hpp"
 #include "governor/policy/governor.hpp"
 
 namespace roborun::flight {
 
-/// More cameras than that no vehicle has.
-inline constexpr std::size_t kMostCameras = 8;
+/// For vehicles that do not see all around: the yaw follows where they will fly.
+struct GazeConfig {
+  bool follows{false};         ///< False: the yaw of the take-off is kept.
+  double yaw_rate_radps{0.8};  ///< (0, 3]. Images of 30 ms blur by less than two pixels of 640.
+  double stuck_s{3.0};         ///< Hovering for so long without a new trajectory: it looks round.
+  double lead_s{0.7};          ///< Looks where the trajectory goes so much later.
+};
 
 /// Read once, before the lanes start.
 struct FlightConfig {
@@ -26,6 +32,11 @@ struct FlightConfig {
   double cruise_m{};                 ///< Height of the first hover, world frame.
   core::Fence fence{};               ///< What it forbids is occupied for planner and smoother.
   double camera_range_m{25.0};       ///< Of the cameras that the plans rely on. (1, 200]
+  bool sees_all_around{true};        ///< The cameras together; false: what is not seen may be anything.
+  double level_view_ratio{1.0};      ///< Tangent of the elevation, up and down, that one turn sees.
+  GazeConfig gaze{};
+  /// Pixels a side of the images that each LiDAR's cloud becomes; 0: there is no such LiDAR.
+  std::array<std::uint16_t, kMostLidars> cloud_pixels{};
   governor::Design design{governor::Design::kAware};
   core::CostProfile costs{};  ///< What the stages without knobs cost: their constant is planned for.
   governor::KnobArray<governor::LatencyModel> model{};  ///< Map, export, planner.
@@ -36,5 +47,7 @@ struct FlightConfig {
 
 /// What the map has to hold: the flight's bounds and a margin in which surfaces are of interest.
 [[nodiscard]] Aabb map_bounds_W(const FlightConfig& config) noexcept;
+/// What a rig says of a flight: range, what is seen, the size of clouds.
+void describe_sensors(const SensorRig& rig, FlightConfig& config) noexcept;
 
 }  // namespace roborun::flight

@@ -70,6 +70,7 @@ void FlightControl::commit(MonotonicTime now) {
     first_estimate_ = now;
     const Matrix3 R_WB = state.q_WB.toRotationMatrix();
     yaw_rad_ = core::atan2(R_WB(1, 0), R_WB(0, 0));
+    gaze_.begin(yaw_rad_);
   }
   if (!flying_) {
     if (now - *first_estimate_ < kSettle || !may_take_off_) return;
@@ -79,9 +80,10 @@ void FlightControl::commit(MonotonicTime now) {
     home_W_ = committed_.end_W();
     ground_m_ = state.p_WB.z();
   }
-  if (!airborne_ && now > committed_.start_time + from_seconds(committed_.duration_s()) + kHover)
+  if (!airborne_ && now > committed_.start_time + from_seconds(committed_.duration_s()) + kHover &&
+      gaze_.ready())
     airborne_ = true;
-  if (braking_ || descending_) offered_.reset();
+  if (braking_ || descending_ || !gaze_.ready()) offered_.reset();
   if (offered_ && offered_->start_time <= now) {
     committed_ = *offered_;
     ++committed_number_;
@@ -175,6 +177,7 @@ void FlightControl::track(MonotonicTime now, firmware_if::Motors& motors) {
   if (!flying_ || landed_ || estimator_.state(in.state) != Status::kOk) return;
   reference_ = next_reference(now);
   in.reference = reference_;
+  if (!descending_) yaw_rad_ = gaze_.step({now, committed_, committed_number_});
   in.yaw_rad = yaw_rad_;
   // A refused step leaves the command of the frame before.
   (void)tracker_.step(in, command_);

@@ -10,6 +10,7 @@
 #include "firmware_if/gnss.hpp"
 #include "firmware_if/imu.hpp"
 #include "firmware_if/motors.hpp"
+#include "platform/flight/gaze.hpp"
 #include "stages/control/estimator.hpp"
 #include "stages/control/tracker.hpp"
 
@@ -18,11 +19,12 @@ namespace roborun::flight {
 class FlightControl {
  public:
   /// `period_s` is the minor frame.
-  FlightControl(const VehicleModel& vehicle, double period_s)
+  FlightControl(const VehicleModel& vehicle, double period_s, const GazeConfig& gaze = {})
       : vehicle_(vehicle),
         estimator_({}),
         tracker_(stages::Tracker::config_for(vehicle, period_s)),
-        period_s_(period_s) {}
+        period_s_(period_s),
+        gaze_(gaze, period_s) {}
 
   /// Straight up to the height of the first hover, flown as soon as the estimator has settled.
   void set_cruise_height(double cruise_m) { cruise_m_ = cruise_m; }
@@ -50,7 +52,7 @@ class FlightControl {
   [[nodiscard]] std::uint64_t committed_number() const { return committed_number_; }
   [[nodiscard]] const stages::Estimator& estimator() const { return estimator_; }
   [[nodiscard]] const stages::Tracker& tracker() const { return tracker_; }
-  /// The climb is over: decisions may begin.
+  /// The climb is over, and the look round of a vehicle that needs one: decisions may begin.
   [[nodiscard]] bool airborne() const { return airborne_; }
 
   /// To a stop along the committed trajectory, whose path stays as it was checked; then it hovers there. What
@@ -94,6 +96,7 @@ class FlightControl {
   std::optional<MonotonicTime> first_estimate_;
   bool flying_{false};  ///< There is a trajectory to track.
   bool airborne_{false};
+  Gaze gaze_;
   double yaw_rad_{0.0};
   bool may_take_off_{true};
 

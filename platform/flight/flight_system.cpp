@@ -7,12 +7,14 @@ namespace {
 
 constexpr double kMapMargin_m = 3.0;
 
-PipelineConfig pipeline_config(const FlightConfig& config, std::size_t cameras) noexcept {
+PipelineConfig pipeline_config(const FlightConfig& config, std::size_t cameras, std::size_t lidars) noexcept {
   PipelineConfig pipeline;
   pipeline.flight_bounds_W = config.bounds_W;
   pipeline.vehicle = config.vehicle;
   pipeline.map_bounds_W = map_bounds_W(config);
-  pipeline.cameras = cameras;
+  pipeline.images = cameras + lidars * stages::CloudImages::kImages;
+  pipeline.level_view_ratio = config.level_view_ratio;
+  pipeline.sees_all_around = config.sees_all_around;
   pipeline.horizon_m = config.camera_range_m - 1.0;
   pipeline.fence = config.fence;
   pipeline.minor_frame = config.minor_frame;
@@ -45,21 +47,35 @@ Aabb map_bounds_W(const FlightConfig& config) noexcept {
   return {config.bounds_W.min_W - margin, config.bounds_W.max_W + margin};
 }
 
-std::size_t FlightSystem::arena_bytes() noexcept { return stages::PointCloud::arena_bytes({}); }
+void describe_sensors(const SensorRig& rig, FlightConfig& config) noexcept {
+  config.camera_range_m = shortest_range_m(rig);
+  config.sees_all_around = cameras_see_all_around(rig);
+  config.level_view_ratio = level_view_ratio(rig);
+  config.gaze.follows = !sees_horizon(rig);
+  config.cloud_pixels = {};
+  for (std::size_t i = 0; i < rig.lidars.size(); ++i) config.cloud_pixels[i] = cloud_pixels(rig.lidars[i]);
+}
+
+std::size_t FlightSystem::arena_bytes(const FlightConfig& config) noexcept {
+  std::size_t bytes = stages::PointCloud::arena_bytes({});
+  for (const std::uint16_t pixels : config.cloud_pixels)
+    if (pixels > 0) bytes += stages::CloudImages::arena_bytes({pixels});
+  return bytes;
+}
 
 FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, Aircraft& aircraft,
                            std::span<firmware_if::DepthCamera* const> cameras, const FlightParts& parts,
-                           core::Arena& arena) noexcept
+                           core::Arena& arena, std::span<firmware_if::Lidar* const> lidars) noexcept
     : map_(parts.map),
       cloud_({}, arena),
       governor_(governor_config(config)),
       policy_(parts.policy != nullptr ? *parts.policy : governor_),
-      pipeline_(pipeline_config(config, cameras.size()), meter, policy_, cloud_, parts.map, parts.planner,
-                smoother_),
-      control_(config.vehicle, seconds(config.minor_frame)),
+      pipeline_(pipeline_config(config, cameras.size(), lidars.size()), meter, policy_, cloud_, parts.map,
+                parts.planner, smoother_),
+      control_(config.vehicle, seconds(config.minor_frame), config.gaze),
       flight_program_({config.vehicle, config.fence, config.answers}, control_, aircraft, mail_),
       decision_program_({config.goal_W, config.seed, config.fence, config.minor_frame}, pipeline_, cameras,
-                        mail_) {
+                        mail_, lidars, config.cloud_pixels, arena) {
   control_.set_cruise_height(config.cruise_m);
 }
 

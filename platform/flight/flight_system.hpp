@@ -30,15 +30,15 @@ struct FlightParts {
 class FlightSystem {
  public:
   /// Takes arena_bytes() from the arena: look at arena.exhausted() before the lanes start. At most
-  /// kMostCameras cameras; all references outlive the system.
+  /// kMostCameras cameras and kMostLidars LiDARs; all references outlive the system.
   FlightSystem(const FlightConfig& config, core::StageMeter& meter, Aircraft& aircraft,
                std::span<firmware_if::DepthCamera* const> cameras, const FlightParts& parts,
-               core::Arena& arena) noexcept;
+               core::Arena& arena, std::span<firmware_if::Lidar* const> lidars = {}) noexcept;
   FlightSystem(const FlightSystem&) = delete;
   FlightSystem& operator=(const FlightSystem&) = delete;
 
   /// What the constructor takes from the arena.
-  [[nodiscard]] static std::size_t arena_bytes() noexcept;
+  [[nodiscard]] static std::size_t arena_bytes(const FlightConfig& config) noexcept;
 
   [[nodiscard]] FlightControl& control() noexcept { return control_; }
   [[nodiscard]] FlightProgram& flight_program() noexcept { return flight_program_; }

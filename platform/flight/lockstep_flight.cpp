@@ -4,13 +4,13 @@ namespace roborun::flight {
 
 LockstepFlight::LockstepFlight(const FlightConfig& config, Aircraft& aircraft,
                                std::span<firmware_if::DepthCamera* const> cameras, const FlightParts& parts,
-                               core::Arena& arena) noexcept
+                               core::Arena& arena, std::span<firmware_if::Lidar* const> lidars) noexcept
     : aircraft_(aircraft),
       minor_frame_(config.minor_frame),
       rated_costs_(config.costs),
       costs_(config.costs),
       meter_(costs_, decision_clock_),
-      system_(config, meter_, aircraft, cameras, parts, arena),
+      system_(config, meter_, aircraft, cameras, parts, arena, lidars),
       flight_lane_(core::LaneId::kFlight, flight_clock_, system_.flight_program(), reactions_, nullptr),
       decision_lane_(core::LaneId::kDecision, decision_clock_, system_.decision_program(), reactions_,
                      nullptr) {

@@ -20,7 +20,7 @@ class LockstepFlight {
   /// As FlightSystem; decisions are charged what config.costs says.
   LockstepFlight(const FlightConfig& config, Aircraft& aircraft,
                  std::span<firmware_if::DepthCamera* const> cameras, const FlightParts& parts,
-                 core::Arena& arena) noexcept;
+                 core::Arena& arena, std::span<firmware_if::Lidar* const> lidars = {}) noexcept;
 
   /// One minor frame of all lanes. A decision is computed at once from the inputs of its start; its last
   /// slot, the hand-over, waits until the board would have been ready. Returns the decision begun in this

@@ -168,12 +168,13 @@ RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
       flight_config_(flight_config_of(world, config.mission)),
       motor_bus_(motor_bus_of(config, clock_)),
       kill_lines_(config.kill ? std::make_unique<gpio::KernelKillLines>(*config.kill) : nullptr),
-      cameras_(world, config.mission.simulator.camera, config.mission.seed),
+      cameras_(world, config.mission.simulator, config.mission.seed),
       aircraft_(flight_config_.vehicle, config.mission.simulator, ground_below(world), config.mission.seed,
                 flight_config_.minor_frame, cameras_, outside(motor_bus_.get(), kill_lines_.get())),
       start_W_(aircraft_.vehicle().state().p_WB),
       setup_(flight_config_, config.mission.backends, image_limits(config.mission), config.mission.own),
-      system_(flight_config_, meter_, aircraft_, cameras_.cameras(), setup_.parts(), setup_.arena()),
+      system_(flight_config_, meter_, aircraft_, cameras_.cameras(), setup_.parts(), setup_.arena(),
+              cameras_.lidars()),
       program_{Injected{system_.flight_program(), config.inject, over_},
                Injected{system_.decision_program(), config.inject, over_},
                Injected{cameras_, config.inject, over_}, Injected{watchdog_, config.inject, over_}},
@@ -362,12 +363,12 @@ report::AuditReport run_real_time(const sitl::World& world, const RealTimeConfig
 std::vector<report::PoolUse> memory_plan_of(const sitl::World& world, const MissionConfig& config) {
   const flight::FlightConfig flight = flight_config_of(world, config);
   FlightSetup setup(flight, config.backends, image_limits(config), config.own);
-  sitl::CameraRig rig(world, config.simulator.camera, config.seed);
+  sitl::CameraRig rig(world, config.simulator, config.seed);
   sitl::SimulatedAircraft aircraft(flight.vehicle, config.simulator, ground_below(world), config.seed,
                                    flight.minor_frame, rig);
   core::ClockMeter meter;
   const auto system = std::make_unique<flight::FlightSystem>(flight, meter, aircraft, rig.cameras(),
-                                                             setup.parts(), setup.arena());
+                                                             setup.parts(), setup.arena(), rig.lidars());
   setup.check();
   return setup.pools();
 }

@@ -6,7 +6,8 @@ namespace roborun::mission {
 
 FlightSetup::FlightSetup(const flight::FlightConfig& config, const board::BackendNames& backends,
                          const board::ImageLimits& images, const board::OwnParts& own)
-    : block_(flight::FlightSystem::arena_bytes() + board::backend_bytes(map_bounds_W(config), images) + 4096),
+    : block_(flight::FlightSystem::arena_bytes(config) + board::backend_bytes(map_bounds_W(config), images) +
+             4096),
       arena_(block_),
       parts_(board::make_backends(backends, map_bounds_W(config), images, arena_, own)),
       policy_(own.policy ? own.policy(config) : nullptr) {}

@@ -77,18 +77,19 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
       config_(checked(world, config)),
       flight_config_(flight_config_of(world, config)),
       faults_(config),
-      rig_(world, config.simulator.camera, config.seed),
+      rig_(world, config.simulator, config.seed),
       aircraft_(flight_config_.vehicle, config.simulator, ground_below(world), config.seed,
                 config.flight.minor_frame, rig_),
       cameras_(faults_.connect(rig_.cameras())),
-      recorder_(config.record.empty() ? nullptr
-                                      : std::make_unique<FlightRecorder>(config.record, flight_config_,
-                                                                         config, aircraft_, cameras_)),
+      recorder_(config.record.empty()
+                    ? nullptr
+                    : std::make_unique<FlightRecorder>(config.record, flight_config_, config, aircraft_,
+                                                       cameras_, rig_.lidars())),
       setup_(flight_config_, config.backends, image_limits(config), config.own),
       planner_(setup_.parts().planner, faults_.line()),
       flight_(flight_config_, recorder_ ? recorder_->aircraft() : aircraft_,
               recorder_ ? recorder_->cameras() : std::span<firmware_if::DepthCamera* const>(cameras_),
-              parts(), setup_.arena()),
+              parts(), setup_.arena(), recorder_ ? recorder_->lidars() : rig_.lidars()),
       system_(flight_.system()),
       judge_(config.judge, flight_config_.fence, flight_config_.vehicle.radius_m, world, aircraft_, system_) {
   setup_.check();

@@ -21,7 +21,11 @@ flight::FlightConfig flight_config_of(const sitl::World& world, const MissionCon
   flight.bounds_W = world.bounds_W();
   flight.goal_W = world.goal_W();
   flight.cruise_m = world.start_W().z();
-  flight.camera_range_m = config.simulator.camera.range_m;
+  const SensorRig rig = sitl::rig_of(config.simulator);
+  if (const auto fault = first_fault(rig))
+    throw InputError(fmt::format("{} {}: {}: must be from {} to {}: {}", fault->sensor, fault->index + 1,
+                                 fault->key, fault->low, fault->high, fault->text));
+  describe_sensors(rig, flight);
   flight.seed = config.seed;
   return flight;
 }
@@ -33,7 +37,7 @@ void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle) {
 Vector3 ground_below(const sitl::World& world) { return {world.start_W().x(), world.start_W().y(), 0.0}; }
 
 board::ImageLimits image_limits(const MissionConfig& config) {
-  return {config.simulator.camera.pixels, config.simulator.camera.range_m, config.flight.vehicle.radius_m};
+  return board::image_limits(sitl::rig_of(config.simulator), config.flight.vehicle);
 }
 
 }  // namespace roborun::mission

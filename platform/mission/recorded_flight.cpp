@@ -12,7 +12,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 constexpr double kFarthest_m = 20e3;  // as in world files
 
 Json vector_json(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
@@ -91,6 +91,42 @@ Json vehicle_json(const VehicleModel& vehicle) {
   return j;
 }
 
+template <class Sensors>
+Json sensors_json(const Sensors& sensors) {
+  Json list = Json::array();
+  for (const auto& sensor : sensors) {
+    Json one;
+    for (const auto& key : keys_of(sensor)) one[key.key] = key.get(sensor);
+    list.push_back(std::move(one));
+  }
+  return list;
+}
+
+template <class Spec, std::size_t N>
+void read_sensors(const Json& list, core::StaticVector<Spec, N>& sensors) {
+  for (const Json& one : list) {
+    Spec spec;
+    for (const SensorKey<Spec>& key : keys_of(spec)) key.set(spec, number(one, key.key, key.low, key.high));
+    if (!sensors.push_back(spec)) throw InputError(fmt::format("must be at most {} sensors of a kind", N));
+  }
+}
+
+Json mounts_json(const std::vector<firmware_if::CameraMount>& mounts) {
+  Json list = Json::array();
+  for (const firmware_if::CameraMount& mount : mounts)
+    list.push_back({{"R_BC", mount.R_BC}, {"p_BC_m", mount.p_BC_m}});
+  return list;
+}
+
+std::vector<firmware_if::CameraMount> read_mounts(const Json& json, const char* key, std::size_t count) {
+  std::vector<firmware_if::CameraMount> mounts;
+  for (const Json& mount : json.at(key))
+    mounts.push_back(
+        {mount.at("R_BC").get<std::array<double, 9>>(), mount.at("p_BC_m").get<std::array<double, 3>>()});
+  if (mounts.size() != count) throw InputError(fmt::format("{}: must be {}, one per sensor", key, count));
+  return mounts;
+}
+
 }  // namespace
 
 std::string to_json(const RecordedFlight& recorded) {
@@ -107,14 +143,16 @@ std::string to_json(const RecordedFlight& recorded) {
   j["map"] = recorded.backends.map;
   j["planner"] = recorded.backends.planner;
   j["minor_frame_ns"] = flight.minor_frame.count();
-  j["pixels"] = recorded.images.side_pixels;
-  j["range_m"] = recorded.images.range_m;
+  j["cameras"] = sensors_json(recorded.sensors.cameras);
+  j["lidars"] = sensors_json(recorded.sensors.lidars);
+  const flight::GazeConfig& gaze = flight.gaze;
+  j["gaze"] = {{"yaw_rate_radps", gaze.yaw_rate_radps}, {"stuck_s", gaze.stuck_s}, {"lead_s", gaze.lead_s}};
   j["slow_down_at_s"] = recorded.slow_down.at_s;
   j["slow_down_factor"] = recorded.slow_down.factor;
   j["answers"] = flight.answers;
   j["fence"] = fence_json(flight.fence);
-  for (const firmware_if::CameraMount& mount : recorded.mounts)
-    j["mounts"].push_back({{"R_BC", mount.R_BC}, {"p_BC_m", mount.p_BC_m}});
+  j["mounts"] = mounts_json(recorded.mounts);
+  j["lidar_mounts"] = mounts_json(recorded.lidar_mounts);
   for (const core::StageCost& c : flight.costs.stage)
     j["costs"].push_back({{"fixed_s", c.fixed_s}, {"per_unit_s", c.per_unit_s}, {"per_m3_s", c.per_m3_s}});
   for (const governor::LatencyModel& m : flight.model)
@@ -142,20 +180,20 @@ RecordedFlight recorded_flight_from(std::span<const std::byte> json) {
   const auto rate_Hz = static_cast<int>(1e9 / number(j, "minor_frame_ns", 1e6, 1e9));
   if (!core::is_flight_rate(rate_Hz) || core::minor_frame_of(rate_Hz) != flight.minor_frame)
     throw InputError("minor_frame_ns: no rate of the flight lane");
-  recorded.images.side_pixels = static_cast<std::uint16_t>(number(j, "pixels", 8, 512));
-  recorded.images.range_m = number(j, "range_m", 1, 200);
-  flight.camera_range_m = recorded.images.range_m;
-  recorded.images.vehicle_radius_m = flight.vehicle.radius_m;
+  read_sensors(j.at("cameras"), recorded.sensors.cameras);
+  read_sensors(j.at("lidars"), recorded.sensors.lidars);
+  if (const auto fault = first_fault(recorded.sensors))
+    throw InputError(fmt::format("{} {}: {}: {}", fault->sensor, fault->index, fault->key, fault->text));
+  describe_sensors(recorded.sensors, flight);
+  const Json& gaze = j.at("gaze");
+  flight.gaze.yaw_rate_radps = number(gaze, "yaw_rate_radps", 0.01, 3);
+  flight.gaze.stuck_s = number(gaze, "stuck_s", 0, 1e6);
+  flight.gaze.lead_s = number(gaze, "lead_s", 0, 100);
   recorded.slow_down = {number(j, "slow_down_at_s", 0, 1e300), number(j, "slow_down_factor", 0.001, 1000)};
   flight.answers = j.at("answers").get<bool>();
   flight.fence = read_fence(j.at("fence"));
-  const Json& mounts = j.at("mounts");
-  if (mounts.empty() || mounts.size() > flight::kMostCameras)
-    throw InputError(fmt::format("mounts: must be 1 to {}", flight::kMostCameras));
-  for (const Json& mount : mounts) {
-    recorded.mounts.push_back(
-        {mount.at("R_BC").get<std::array<double, 9>>(), mount.at("p_BC_m").get<std::array<double, 3>>()});
-  }
+  recorded.mounts = read_mounts(j, "mounts", recorded.sensors.cameras.size());
+  recorded.lidar_mounts = read_mounts(j, "lidar_mounts", recorded.sensors.lidars.size());
   for (std::size_t i = 0; i < core::kStageCount; ++i) {
     const Json& c = j.at("costs").at(i);
     numbers(c, "fixed_s", flight.costs.stage[i].fixed_s);

@@ -18,8 +18,9 @@ struct RecordedFlight {
   flight::FlightConfig flight{};
   board::BackendNames backends{};
   SlowDown slow_down{};
-  board::ImageLimits images{};
-  std::vector<firmware_if::CameraMount> mounts{};  ///< One per camera.
+  SensorRig sensors{};
+  std::vector<firmware_if::CameraMount> mounts{};        ///< One per camera, as the device gave it.
+  std::vector<firmware_if::CameraMount> lidar_mounts{};  ///< One per LiDAR.
 };
 
 [[nodiscard]] std::string to_json(const RecordedFlight& recorded);

@@ -99,6 +99,29 @@ class FlightRecorder::TappedCamera final : public firmware_if::DepthCamera {
   std::uint32_t index_;
 };
 
+class FlightRecorder::TappedLidar final : public firmware_if::Lidar {
+ public:
+  TappedLidar(FlightRecorder& recorder, firmware_if::Lidar& lidar, std::uint32_t index)
+      : recorder_(recorder), lidar_(lidar), index_(index) {}
+  [[nodiscard]] Status read(firmware_if::LidarSweep& sweep) noexcept override {
+    const Status status = lidar_.read(sweep);
+    if (status != Status::kOk) return status;
+    Put put(recorder_.payload_);
+    put(index_);
+    each_field(put, sweep);
+    for (const auto& point : sweep.points_L_m)
+      for (const float x : point) put(x);
+    recorder_.write(RecordKind::kLidar);
+    return status;
+  }
+  [[nodiscard]] const firmware_if::CameraMount& mount() const noexcept override { return lidar_.mount(); }
+
+ private:
+  FlightRecorder& recorder_;
+  firmware_if::Lidar& lidar_;
+  std::uint32_t index_;
+};
+
 class FlightRecorder::TappedMotors final : public firmware_if::Motors {
  public:
   TappedMotors(FlightDigest& digest, firmware_if::Motors& motors) : digest_(digest), motors_(motors) {}
@@ -114,7 +137,8 @@ class FlightRecorder::TappedMotors final : public firmware_if::Motors {
 
 FlightRecorder::FlightRecorder(const std::string& path, const flight::FlightConfig& flight,
                                const MissionConfig& config, flight::Aircraft& aircraft,
-                               std::span<firmware_if::DepthCamera* const> cameras)
+                               std::span<firmware_if::DepthCamera* const> cameras,
+                               std::span<firmware_if::Lidar* const> lidars)
     : path_(recordable(path, config)), file_(path, std::ios::binary | std::ios::trunc), aircraft_(aircraft) {
   if (!file_) throw InputError(fmt::format("{}: cannot be written", path));
   imu_ = std::make_unique<Tap<firmware_if::Imu, firmware_if::ImuSample>>(*this, aircraft.imu());
@@ -122,12 +146,17 @@ FlightRecorder::FlightRecorder(const std::string& path, const flight::FlightConf
   barometer_ = std::make_unique<Tap<firmware_if::Barometer, firmware_if::BarometerSample>>(
       *this, aircraft.barometer());
   motors_ = std::make_unique<TappedMotors>(digest_, aircraft.motors());
-  RecordedFlight recorded{flight, config.backends, config.slow_down, image_limits(config), {}};
+  RecordedFlight recorded{flight, config.backends, config.slow_down, sitl::rig_of(config.simulator), {}, {}};
   for (firmware_if::DepthCamera* camera : cameras) {
     camera_.push_back(
         std::make_unique<TappedCamera>(*this, *camera, static_cast<std::uint32_t>(camera_.size())));
     cameras_.push_back(camera_.back().get());
     recorded.mounts.push_back(camera->mount());
+  }
+  for (firmware_if::Lidar* lidar : lidars) {
+    lidar_.push_back(std::make_unique<TappedLidar>(*this, *lidar, static_cast<std::uint32_t>(lidar_.size())));
+    lidars_.push_back(lidar_.back().get());
+    recorded.lidar_mounts.push_back(lidar->mount());
   }
   const std::string start = to_json(recorded);
   const auto* bytes = reinterpret_cast<const std::byte*>(start.data());

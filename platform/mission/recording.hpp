@@ -2,7 +2,7 @@
 /// the lanes read it, and the digest of what they did with it. A file of records:
 ///   u32 kind | u32 bytes | payload | u64 checksum over all three and the checksum before
 /// in the byte order of x86-64 and AArch64. Records: kStart (configuration as JSON), for each minor frame
-/// kFrame (its instant) and the samples, health and images read in it, kGiveUp, kEnd (digest, minor frames,
+/// kFrame (its instant) and the samples, health, images and sweeps read in it, kGiveUp, kEnd (digest, minor frames,
 /// decisions). Faults of sensors, battery, link, ESCs, bus, kill switch and wind are in what was read; faults
 /// of the computer itself (cpu, planner, map) are no input, and such a flight is refused.
 #pragma once
@@ -16,6 +16,7 @@
 
 #include "core/record/state_hash.hpp"
 #include "firmware_if/depth_camera.hpp"
+#include "firmware_if/lidar.hpp"
 #include "platform/flight/aircraft.hpp"
 #include "platform/flight/decision_pipeline.hpp"
 #include "platform/mission/mission_config.hpp"
@@ -32,9 +33,10 @@ enum class RecordKind : std::uint32_t {
   kHealth,
   kDepth,
   kGiveUp,
-  kEnd
+  kEnd,
+  kLidar
 };
-inline constexpr std::size_t kRecordKinds = 9;
+inline constexpr std::size_t kRecordKinds = 10;
 
 /// What a flight did: every motor command, "motors off" and decision as they came, the map in the end.
 class FlightDigest {
@@ -58,10 +60,12 @@ struct FlightTotals {
 class FlightRecorder final : private flight::Aircraft {
  public:
   FlightRecorder(const std::string& path, const flight::FlightConfig& flight, const MissionConfig& config,
-                 flight::Aircraft& aircraft, std::span<firmware_if::DepthCamera* const> cameras);
+                 flight::Aircraft& aircraft, std::span<firmware_if::DepthCamera* const> cameras,
+                 std::span<firmware_if::Lidar* const> lidars = {});
 
   [[nodiscard]] flight::Aircraft& aircraft() noexcept { return *this; }
   [[nodiscard]] std::span<firmware_if::DepthCamera* const> cameras() noexcept { return cameras_; }
+  [[nodiscard]] std::span<firmware_if::Lidar* const> lidars() noexcept { return lidars_; }
   void decided(const flight::DecisionOutput& decision) noexcept;
   void gave_up() noexcept { write(RecordKind::kGiveUp); }
   void finish(const stages::OccupancyMap& map);
@@ -70,6 +74,7 @@ class FlightRecorder final : private flight::Aircraft {
   template <typename Device, typename Sample>
   class Tap;
   class TappedCamera;
+  class TappedLidar;
   class TappedMotors;
 
   void begin_frame(MonotonicTime now) noexcept override;
@@ -97,6 +102,8 @@ class FlightRecorder final : private flight::Aircraft {
   std::unique_ptr<firmware_if::Motors> motors_;
   std::vector<std::unique_ptr<firmware_if::DepthCamera>> camera_;
   std::vector<firmware_if::DepthCamera*> cameras_;
+  std::vector<std::unique_ptr<firmware_if::Lidar>> lidar_;
+  std::vector<firmware_if::Lidar*> lidars_;
 };
 
 }  // namespace roborun::mission

@@ -11,6 +11,7 @@
 
 #include "core/record/state_hash.hpp"
 #include "firmware_if/depth_camera.hpp"
+#include "firmware_if/lidar.hpp"
 #include "platform/flight/aircraft.hpp"
 #include "platform/mission/recording.hpp"
 
@@ -77,7 +78,16 @@ void each_field(F&& f, firmware_if::DepthFrame& s) {
   f(s.sequence);
   f(s.width);
   f(s.height);
-  f(s.tan_half_fov_ratio);
+  f(s.tan_half_width);
+  f(s.tan_half_height);
+  f(s.range_m);
+  f(s.range_min_m);
+}
+template <typename F>
+void each_field(F&& f, firmware_if::LidarSweep& s) {
+  each_field(f, s.stamp);
+  f(s.sequence);
+  f(s.range_min_m);
   f(s.range_m);
 }
 template <typename F>

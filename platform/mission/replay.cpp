@@ -11,8 +11,10 @@ namespace roborun::mission {
 namespace {
 
 constexpr std::uint32_t kMostStart = 1U << 16U;
-constexpr std::uint32_t kDepthHead = 4 + 8 + 4 + 2 + 2 + 4 + 4;
-constexpr std::uint32_t kMostDepth = kDepthHead + 512 * 512 * 4;
+constexpr std::uint32_t kDepthHead = 4 + 8 + 4 + 2 + 2 + 4 * 4;
+constexpr std::uint32_t kMostDepth = kDepthHead + 1280 * 1280 * 4;
+constexpr std::uint32_t kLidarHead = 4 + 8 + 4 + 2 * 4;
+constexpr std::uint32_t kMostLidar = kLidarHead + 256 * 4096 * 12;
 struct Size {
   std::uint32_t least, most;
 };
@@ -24,7 +26,8 @@ constexpr std::array<Size, kRecordKinds> kSizes{{{2, kMostStart},
                                                  {18, 18},
                                                  {kDepthHead, kMostDepth},
                                                  {0, 0},
-                                                 {24, 24}}};
+                                                 {24, 24},
+                                                 {kLidarHead, kMostLidar}}};
 
 }  // namespace
 
@@ -126,6 +129,32 @@ class ReplayedCamera final : public firmware_if::DepthCamera {
   std::vector<float> depth_m_;
 };
 
+class ReplayedLidar final : public firmware_if::Lidar {
+ public:
+  ReplayedLidar(Recording& recording, std::uint32_t index)
+      : recording_(recording), index_(index), mount_(recording.flight().lidar_mounts[index]) {}
+  [[nodiscard]] Status read(firmware_if::LidarSweep& sweep) noexcept override {
+    if (recording_.kind() != RecordKind::kLidar) return Status::kNotReady;
+    Get get(recording_.payload());
+    std::uint32_t index = 0;
+    get(index);
+    if (index != index_) return Status::kNotReady;
+    each_field(get, sweep);
+    point_L_m_.resize(get.rest().size() / sizeof(point_L_m_[0]));
+    std::memcpy(point_L_m_.data(), get.rest().data(), point_L_m_.size() * sizeof(point_L_m_[0]));
+    sweep.points_L_m = point_L_m_;
+    recording_.next();
+    return Status::kOk;
+  }
+  [[nodiscard]] const firmware_if::CameraMount& mount() const noexcept override { return mount_; }
+
+ private:
+  Recording& recording_;
+  std::uint32_t index_;
+  firmware_if::CameraMount mount_;
+  std::vector<std::array<float, 3>> point_L_m_;
+};
+
 class ReplayedAircraft final : public flight::Aircraft, private firmware_if::Motors {
  public:
   ReplayedAircraft(Recording& recording, FlightDigest& digest)
@@ -178,9 +207,14 @@ ReplayResult replay_flight(const std::string& path, const std::function<void(dou
   for (std::uint32_t i = 0; i < recorded.mounts.size(); ++i) camera.emplace_back(recording, i);
   std::vector<firmware_if::DepthCamera*> cameras;
   for (ReplayedCamera& c : camera) cameras.push_back(&c);
-  FlightSetup setup(recorded.flight, recorded.backends, recorded.images);
+  std::vector<ReplayedLidar> lidar;
+  for (std::uint32_t i = 0; i < recorded.lidar_mounts.size(); ++i) lidar.emplace_back(recording, i);
+  std::vector<firmware_if::Lidar*> lidars;
+  for (ReplayedLidar& l : lidar) lidars.push_back(&l);
+  FlightSetup setup(recorded.flight, recorded.backends,
+                    board::image_limits(recorded.sensors, recorded.flight.vehicle));
   const auto flight = std::make_unique<flight::LockstepFlight>(recorded.flight, aircraft, cameras,
-                                                               setup.parts(), setup.arena());
+                                                               setup.parts(), setup.arena(), lidars);
   setup.check();
   ReplayResult result;
   double told_s = 0.0;

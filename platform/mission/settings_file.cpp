@@ -78,6 +78,21 @@ void read_areas(const input::TomlReader& reader, const toml::table& table, const
   }
 }
 
+/// What [camera] says goes for all cameras of the rig.
+void apply(const toml::table& said, const sitl::DepthCameraConfig& camera, SensorRig& rig) {
+  for (CameraSpec& c : rig.cameras) {
+    if (said.contains("pixels")) c.width = c.height = camera.pixels;
+    if (said.contains("range_m")) c.range_m = camera.range_m;
+    if (said.contains("rate_Hz")) c.rate_Hz = camera.rate_Hz;
+    if (said.contains("latency_s")) c.latency_s = camera.latency_s;
+  }
+}
+
+void limit_range(double range_m, SensorRig& rig) {
+  for (CameraSpec& c : rig.cameras) c.range_m = std::min(c.range_m, range_m);
+  for (LidarSpec& l : rig.lidars) l.range_m = std::min(l.range_m, range_m);
+}
+
 }  // namespace
 
 void load_settings(const std::string& path, MissionConfig& config) {
@@ -93,7 +108,7 @@ void read_settings(const input::TomlReader& reader, const toml::table& root, Mis
                                       "pixel_dropout_ratio", "frame_dropout_ratio"})) {
     sitl::DepthCameraConfig& c = config.simulator.camera;
     double pixels = c.pixels;
-    read(reader, *t, "pixels", {8, 512}, pixels);
+    read(reader, *t, "pixels", {8, 1280}, pixels);
     c.pixels = static_cast<std::uint16_t>(pixels);
     read(reader, *t, "range_m", {5, 100}, c.range_m);
     read(reader, *t, "rate_Hz", {1, 100}, c.rate_Hz);
@@ -102,6 +117,7 @@ void read_settings(const input::TomlReader& reader, const toml::table& root, Mis
     read(reader, *t, "noise_per_m", {0, 0.1}, c.noise_per_m);
     read(reader, *t, "pixel_dropout_ratio", {0, 1}, c.pixel_dropout_ratio);
     read(reader, *t, "frame_dropout_ratio", {0, 1}, c.frame_dropout_ratio);
+    if (config.simulator.rig) apply(*t, c, *config.simulator.rig);
   }
   if (const toml::table* t = section(reader, root, "wind", {"mean_mps", "gust_mps"})) {
     if (const toml::node* mean = t->get("mean_mps")) {
@@ -125,6 +141,7 @@ void read_settings(const input::TomlReader& reader, const toml::table& root, Mis
     double visibility_m = config.simulator.camera.range_m;
     read(reader, *t, "visibility_m", {5, 100}, visibility_m);
     config.simulator.camera.range_m = std::min(config.simulator.camera.range_m, visibility_m);
+    if (config.simulator.rig) limit_range(visibility_m, *config.simulator.rig);
   }
   if (const toml::table* t = section(reader, root, "fence", {"altitude_m", "keep_in", "keep_out"})) {
     if (const toml::node* node = t->get("altitude_m")) {

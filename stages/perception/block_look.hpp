@@ -126,9 +126,10 @@ template <class V>
 HWY_INLINE V inside_view(const SightCamera& c, float half_m, V x, V y, V z) {
   const Floats d;
   const auto support = [&](std::size_t side) { return hn::Set(d, half_m * c.support[side]); };
-  const V side = hn::Mul(x, hn::Set(d, c.tan_half));
+  const V side = hn::Mul(x, hn::Set(d, c.tan_half_width));
+  const V top = hn::Mul(x, hn::Set(d, c.tan_half_height));
   const V across = hn::Min(hn::Add(hn::Sub(side, y), support(0)), hn::Add(hn::Add(side, y), support(1)));
-  const V along = hn::Min(hn::Add(hn::Sub(side, z), support(2)), hn::Add(hn::Add(side, z), support(3)));
+  const V along = hn::Min(hn::Add(hn::Sub(top, z), support(2)), hn::Add(hn::Add(top, z), support(3)));
   return hn::Min(across, along);
 }
 
@@ -228,9 +229,9 @@ HWY_INLINE void aim(const SightCamera& c, float half_m, const Lanes& at, Look& l
     const auto half_over_near = hn::Div(half, nearest);
     const auto u = hn::Mul(y, inverse);
     const auto v = hn::Mul(z, inverse);
-    const auto columns = store_pixels(u, half_width(c, 1, u, half_over_near), c.tan_half, c.columns_per_tan,
-                                      c.last_column, pixels.u0 + i, pixels.u1 + i);
-    const auto rows = store_pixels(v, half_width(c, 2, v, half_over_near), c.tan_half, c.rows_per_tan,
+    const auto columns = store_pixels(u, half_width(c, 1, u, half_over_near), c.tan_half_width,
+                                      c.columns_per_tan, c.last_column, pixels.u0 + i, pixels.u1 + i);
+    const auto rows = store_pixels(v, half_width(c, 2, v, half_over_near), c.tan_half_height, c.rows_per_tan,
                                    c.last_row, pixels.v0 + i, pixels.v1 + i);
     longest = hn::Max(longest, hn::Max(columns, rows));
     // What the camera calls empty up to its range is believed up to the range itself: no margin there.

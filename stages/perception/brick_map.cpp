@@ -29,6 +29,10 @@ std::size_t position_count(const Aabb& bounds_W) noexcept {
          static_cast<std::size_t>(even_bricks(size.z()));
 }
 
+std::uint32_t in_brick(std::int32_t cell) noexcept {
+  return static_cast<std::uint32_t>(cell & (kBrickCells - 1));
+}
+
 }  // namespace
 
 Status BrickMap::Config::validate() const noexcept {
@@ -39,8 +43,9 @@ Status BrickMap::Config::validate() const noexcept {
   const double positions = 8.0 * std::ceil(size.x() / kCoarsest_m + 1) *
                            std::ceil(size.y() / kCoarsest_m + 1) * std::ceil(size.z() / kCoarsest_m + 1);
   const bool ok = positions <= kMaxPositions && core::within<std::size_t>(max_bricks, 64, 200000) &&
-                  core::within<std::size_t>(max_frames, 1, kMaxCameras) &&
-                  core::within<std::size_t>(max_image_side, 8, kMaxImageSide) &&
+                  core::within<std::size_t>(max_frames, 1, kMaxCameras) && all_around_frames <= max_frames &&
+                  core::within<std::size_t>(max_image_width, 8, kMaxImageSide) &&
+                  core::within<std::size_t>(max_image_height, 8, kMaxImageSide) &&
                   core::within(vehicle_radius_m, 0.0, 2.0) && core::within(depth_margin_m, 0.0, 10.0) &&
                   core::within(depth_margin_quadratic_per_m, 0.0, 1.0);
   return ok ? Status::kOk : Status::kInvalidArgument;
@@ -50,7 +55,7 @@ std::size_t BrickMap::arena_bytes(const Config& config) noexcept {
   const std::size_t positions = position_count(config.bounds_W);
   return positions * (2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
          config.max_bricks * (sizeof(Brick) + 2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
-         config.max_frames * DepthPyramid::arena_bytes(config.max_image_side) +
+         config.max_frames * DepthPyramid::arena_bytes(config.max_image_width, config.max_image_height) +
          16 * alignof(std::max_align_t);
 }
 
@@ -88,7 +93,8 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
     free_list_[i] = static_cast<std::uint32_t>(free_list_.size() - 1 - i);
   }
   free_count_ = free_list_.size();
-  for (std::size_t i = 0; i < config.max_frames; ++i) pyramid_[i].emplace(arena, config.max_image_side);
+  for (std::size_t i = 0; i < config.max_frames; ++i)
+    pyramid_[i].emplace(arena, config.max_image_width, config.max_image_height);
 }
 
 const Brick* BrickMap::brick_at(std::size_t position) const noexcept {
@@ -148,6 +154,48 @@ void BrickMap::free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noe
   } else if (Brick* brick = touch(bx, by, bz)) {
     brick->add_free(kBrickLevel, 0, 1U);
     brick->cleared = free_now_;
+  }
+}
+
+void BrickMap::free_vehicle() noexcept {
+  const double r_m = config_.vehicle_radius_m;
+  const int n = static_cast<int>(std::ceil(r_m / kFinestCell_m));
+  for (int dz = -n; dz <= n; ++dz) {
+    for (int dy = -n; dy <= n; ++dy) {
+      for (int dx = -n; dx <= n; ++dx) {
+        const Vector3 offset = kFinestCell_m * Vector3(dx, dy, dz);
+        Cell cell{};
+        if (offset.norm() > r_m || !cell_of(vehicle_W_ + offset, cell)) continue;
+        const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
+        if (slot_[slot_of(bx, by, bz)] <= kFreeBrick) continue;
+        Brick* brick = touch(bx, by, bz);
+        if (brick == nullptr) continue;
+        const std::uint32_t morton = morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z));
+        brick->add_free(0, morton / 8, static_cast<std::uint8_t>(1U << (morton % 8)));
+      }
+    }
+  }
+}
+
+void BrickMap::assume_free(const Vector3& half_m) noexcept {
+  const auto cells = [&half_m](int axis) {
+    return static_cast<int>(std::clamp(half_m[axis], 0.0, 10.0) / kFinestCell_m);
+  };
+  const int nx = cells(0), ny = cells(1), nz = cells(2);
+  for (int dz = -nz; dz <= nz; ++dz) {
+    for (int dy = -ny; dy <= ny; ++dy) {
+      for (int dx = -nx; dx <= nx; ++dx) {
+        Cell cell{};
+        if (!cell_of(vehicle_W_ + kFinestCell_m * Vector3(dx, dy, dz), cell)) continue;
+        const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
+        if (slot_[slot_of(bx, by, bz)] <= kFreeBrick) continue;
+        Brick* brick = touch(bx, by, bz);
+        if (brick == nullptr) continue;
+        const std::uint32_t morton = morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z));
+        if (brick->cell(morton) != evidence::kUnknown) continue;
+        brick->add_free(0, morton / 8, static_cast<std::uint8_t>(1U << (morton % 8)));
+      }
+    }
   }
 }
 

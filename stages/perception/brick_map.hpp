@@ -21,6 +21,7 @@
 #include "core/vehicle_model.hpp"
 #include "stages/perception/block_sight.hpp"
 #include "stages/perception/brick.hpp"
+#include "stages/perception/cloud_images.hpp"
 #include "stages/perception/depth_pyramid.hpp"
 #include "stages/perception/frame_guard.hpp"
 #include "stages/perception/image_lines.hpp"
@@ -34,9 +35,12 @@ class BrickMap final : public OccupancyMap, private MapView {
     /// Space outside is never stored: unknown.
     Aabb bounds_W{Vector3(-100.0, -100.0, -5.0), Vector3(100.0, 100.0, 20.0)};
     std::size_t max_bricks{9100};  ///< 1,000,000 m3 at 0.3 m. [64, 200000]
-    /// Cameras. Space between two images counts as seen only if all arrived. [1, 8]
-    std::size_t max_frames{6};
-    std::size_t max_image_side{512};  ///< Pixels. [8, 512]
+    std::size_t max_frames{6};     ///< Of one scan. [1, 8]
+    /// So many images of cameras together see every direction: then what lies between two of them is seen, too.
+    /// 0: the cameras do not see all around. (The images of a cloud do.) [0, max_frames]
+    std::size_t all_around_frames{6};
+    std::size_t max_image_width{512};   ///< Pixels, of the largest image. [8, 1280]
+    std::size_t max_image_height{512};  ///< Pixels, of the largest image. [8, 1280]
     double vehicle_radius_m{
         VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is: free. [0, 2]
     double depth_margin_m{0.05};   ///< A cell is free only if every pixel sees this much past it [0, 10] ...
@@ -105,6 +109,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   struct Position {
     std::int32_t x, y, z;
   };
+  /// A box around everything that a camera of the scan can see, within the bounds.
+  [[nodiscard]] Aabb reach_W() const noexcept;
   [[nodiscard]] std::size_t order_units(const IntegrationRequest& request) noexcept;
   [[nodiscard]] std::size_t unit_index(const Position& unit) const noexcept;
   /// A position as one number, and back: no division.
@@ -150,6 +156,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   /// Whether v0 reached this brick in this scan.
   [[nodiscard]] bool paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept;
   void free_vehicle() noexcept;
+  /// IntegrationRequest::assumed_half_m.
+  void assume_free(const Vector3& half_m) noexcept;
   [[nodiscard]] bool cell_of(const Vector3& p_W, Cell& cell) const noexcept;
   [[nodiscard]] std::size_t slot_of(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
     return (static_cast<std::size_t>(bz) * static_cast<std::size_t>(ny_) + static_cast<std::size_t>(by)) *

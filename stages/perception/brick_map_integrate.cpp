@@ -21,8 +21,12 @@ std::uint32_t in_brick(std::int32_t cell) noexcept {
 
 /// Tiles of at most half the image that a cell of p0 has at the end of the range.
 int tile_shift(const firmware_if::DepthFrame& frame, int level) noexcept {
-  const double cell_pixels = 0.5 * frame.width * cell_size_m(std::clamp(level, 0, kPrecisionLevels - 1)) /
-                             static_cast<double>(frame.tan_half_fov_ratio * frame.range_m);
+  const double half_cell_m = 0.5 * cell_size_m(std::clamp(level, 0, kPrecisionLevels - 1));
+  const double cell_columns =
+      frame.width * half_cell_m / static_cast<double>(frame.tan_half_width * frame.range_m);
+  const double cell_rows =
+      frame.height * half_cell_m / static_cast<double>(frame.tan_half_height * frame.range_m);
+  const double cell_pixels = std::min(cell_columns, cell_rows);
   int shift = 0;
   while (shift < 3 && cell_pixels >= 4.0 * (1 << shift)) ++shift;
   return shift;
@@ -31,6 +35,7 @@ int tile_shift(const firmware_if::DepthFrame& frame, int level) noexcept {
 }  // namespace
 
 std::size_t BrickMap::usable_frames(const IntegrationRequest& request, IntegrationResult& result) noexcept {
+  std::size_t clouds = 0;
   cameras_.count = 0;
   guard_.begin(request.frames);
   for (std::size_t i = 0; i < request.frames.size(); ++i) {
@@ -46,10 +51,13 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
     }
     cameras_.camera[cameras_.count].prepare(posed, *image,
                                             {config_.depth_margin_m, config_.depth_margin_quadratic_per_m});
+    clouds += posed.is_cloud ? 1U : 0U;
     frame_of_[cameras_.count++] = i;
   }
   counters_.frames_refused += result.frames_refused;
-  cameras_.complete = cameras_.count == config_.max_frames;
+  const std::size_t images = cameras_.count - clouds;
+  cameras_.complete =
+      clouds > 0 ? images == 0 && clouds == CloudImages::kImages : images == config_.all_around_frames;
   return cameras_.count;
 }
 
@@ -120,8 +128,10 @@ bool BrickMap::is_white(const PosedDepthFrame& posed, std::span<const Vector3> m
   int blocked = 0;
   for (int v = 0; v < kRays; ++v) {
     for (int u = 0; u < kRays; ++u) {
-      const double t = static_cast<double>(frame.tan_half_fov_ratio);
-      const Vector3 ray_C(1.0, t * (1.0 - (2.0 * u + 1.0) / kRays), t * (1.0 - (2.0 * v + 1.0) / kRays));
+      const auto across = static_cast<double>(frame.tan_half_width);
+      const auto along = static_cast<double>(frame.tan_half_height);
+      const Vector3 ray_C(1.0, across * (1.0 - (2.0 * u + 1.0) / kRays),
+                          along * (1.0 - (2.0 * v + 1.0) / kRays));
       blocked += meets_surface(posed.X_WC.R_RT * ray_C) ? 1 : 0;
     }
   }
@@ -135,8 +145,7 @@ double BrickMap::volume_m3(const Vector3& center_W, double edge_m) const noexcep
   return (high - low).cwiseMax(0.0).prod();
 }
 
-std::size_t BrickMap::order_units(const IntegrationRequest& request) noexcept {
-  // Everything that a camera can see, as a box around all of them.
+Aabb BrickMap::reach_W() const noexcept {
   constexpr double kRounding_m = kFinestCell_m;
   Vector3 low = cameras_.camera[0].p_WC;
   Vector3 high = low;
@@ -145,15 +154,21 @@ std::size_t BrickMap::order_units(const IntegrationRequest& request) noexcept {
     for (int axis = 0; axis < 3; ++axis) {
       const auto k = static_cast<std::size_t>(axis);
       const double ahead = static_cast<double>(c.range_m) * static_cast<double>(c.R_CW[k]);
-      const double aside = static_cast<double>(c.range_m) * static_cast<double>(c.tan_half) *
-                           static_cast<double>(std::fabs(c.R_CW[3 + k]) + std::fabs(c.R_CW[6 + k]));
+      const double aside =
+          static_cast<double>(c.range_m) *
+          (static_cast<double>(c.tan_half_width) * static_cast<double>(std::fabs(c.R_CW[3 + k])) +
+           static_cast<double>(c.tan_half_height) * static_cast<double>(std::fabs(c.R_CW[6 + k])));
       low[axis] = std::min(low[axis], c.p_WC[axis] + std::min(ahead - aside, 0.0) - kRounding_m);
       high[axis] = std::max(high[axis], c.p_WC[axis] + std::max(ahead + aside, 0.0) + kRounding_m);
     }
   }
   const Aabb& bounds = config_.bounds_W;
-  low = low.cwiseMax(bounds.min_W).cwiseMin(bounds.max_W);
-  high = high.cwiseMin(bounds.max_W).cwiseMax(bounds.min_W);
+  return {low.cwiseMax(bounds.min_W).cwiseMin(bounds.max_W),
+          high.cwiseMin(bounds.max_W).cwiseMax(bounds.min_W)};
+}
+
+std::size_t BrickMap::order_units(const IntegrationRequest& request) noexcept {
+  const auto [low, high] = reach_W();
   // Where v0 cannot run out, larger steps give the same map sooner.
   const bool all = request.volume_m3 >= (high - low).prod();
   unit_level_ = all || request.level >= kBlockLevel ? kBlockLevel : kBrickLevel;
@@ -294,7 +309,8 @@ void BrickMap::add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_
   const firmware_if::DepthFrame& frame = camera.posed->frame;
   PixelLine line = camera.line;
   line.first = direction(camera, static_cast<double>(u0) + 0.5, static_cast<double>(v) + 0.5, kFinestCell_m);
-  end_cells(line, frame.depth_m.subspan(v * frame.width + u0, u1 - u0), frame.range_m, row_);
+  end_cells(line, frame.depth_m.subspan(v * frame.width + u0, u1 - u0), {frame.range_min_m, frame.range_m},
+            row_);
   std::size_t last_position = slot_.size();
   Brick* brick = nullptr;
   for (std::size_t n = 0; n < row_.count; ++n) {
@@ -402,9 +418,8 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work)
     camera.posed = &request.frames[frame_of_[i]];
     camera.level = request.level;
     const firmware_if::DepthFrame& frame = camera.posed->frame;
-    const double across = 2.0 * static_cast<double>(frame.tan_half_fov_ratio);
-    camera.column_pitch = across / frame.width;
-    camera.row_pitch = across / frame.height;
+    camera.column_pitch = 2.0 * static_cast<double>(frame.tan_half_width) / frame.width;
+    camera.row_pitch = 2.0 * static_cast<double>(frame.tan_half_height) / frame.height;
     const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kFinestCell_m;
     camera.line.low = {low_.x, low_.y, low_.z};
     camera.line.high = {high_.x, high_.y, high_.z};
@@ -423,26 +438,6 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work)
   }
 }
 
-void BrickMap::free_vehicle() noexcept {
-  const double r_m = config_.vehicle_radius_m;
-  const int n = static_cast<int>(std::ceil(r_m / kFinestCell_m));
-  for (int dz = -n; dz <= n; ++dz) {
-    for (int dy = -n; dy <= n; ++dy) {
-      for (int dx = -n; dx <= n; ++dx) {
-        const Vector3 offset = kFinestCell_m * Vector3(dx, dy, dz);
-        Cell cell{};
-        if (offset.norm() > r_m || !cell_of(vehicle_W_ + offset, cell)) continue;
-        const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
-        if (slot_[slot_of(bx, by, bz)] <= kFreeBrick) continue;
-        Brick* brick = touch(bx, by, bz);
-        if (brick == nullptr) continue;
-        const std::uint32_t morton = morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z));
-        brick->add_free(0, morton / 8, static_cast<std::uint8_t>(1U << (morton % 8)));
-      }
-    }
-  }
-}
-
 Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget& budget,
                            IntegrationResult& result) noexcept {
   result = {};
@@ -450,12 +445,13 @@ Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget&
   if (usable_frames(request, result) == 0 || request.trajectory_W.empty()) return Status::kInvalidArgument;
   ++counters_.scans;
   free_now_ = kFreeBrick - 1 - static_cast<std::int32_t>(counters_.scans % kFreeStamps);
-  vehicle_W_ = cameras_.camera[0].p_WC;
+  vehicle_W_ = cameras_.camera[0].p_WC - request.frames[frame_of_[0]].p_BC_W;
   const std::size_t count = order_units(request);
   const std::size_t done = clear_units(count, request, budget, result.work);
   reach_m_ = done < count ? 0.0 : std::numeric_limits<double>::infinity();
   if (done < count && done > 0) reach_m_ = order_key_[unit_index(unit_at(order_[done - 1]))] * kOrderStep_m;
   free_vehicle();
+  if (!request.assumed_half_m.isZero(0.0)) assume_free(request.assumed_half_m);
   if (request.level >= kBrickLevel)
     for (std::size_t i = 0; i < dirty_count_; ++i) refresh(brick_[dirty_[i]]);  // add_tiles() reads mips
   add_surfaces(request, result.work);

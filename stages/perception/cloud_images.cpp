@@ -42,7 +42,7 @@ Status CloudImages::make(const PosedCloud& cloud) noexcept {
   const bool usable = cloud.range_m > 0.0F && cloud.range_m <= kMaxRange_m && is_finite(cloud.X_WL.p_RT) &&
                       cloud.X_WL.R_RT.allFinite() && !depth_m_.empty();
   const std::size_t side = config_.pixels, pixels = side * side;
-  std::array<bool, kImages> met{};
+  bool met = false;
   if (usable) {
     std::fill(depth_m_.begin(), depth_m_.end(), std::numeric_limits<float>::quiet_NaN());
     for (const std::array<float, 3>& p : cloud.points_L) {
@@ -50,37 +50,36 @@ Status CloudImages::make(const PosedCloud& cloud) noexcept {
         ++counters_.points_refused;
         continue;
       }
+      const float square_m2 = p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+      if (!(square_m2 > cloud.range_min_m * cloud.range_min_m)) continue;
       const std::size_t i = view_of(p);
       const View& view = kViews[i];
       const auto along = [&p](int axis, float sign) { return sign * p[static_cast<std::size_t>(axis)]; };
       const float depth_m = along(view.forward, view.forward_sign);
-      if (!(depth_m > 0.0F && depth_m < cloud.range_m)) continue;
+      if (!(depth_m > 0.0F)) continue;
       const auto pixel = [&](float aside) {
         const float at = 0.5F * (1.0F - aside / depth_m) * static_cast<float>(side);
         return std::clamp(static_cast<std::size_t>(std::fmax(at, 0.0F)), std::size_t{0}, side - 1);
       };
       float& nearest_m = depth_m_[i * pixels + pixel(along(view.up, view.up_sign)) * side +
                                   pixel(along(view.left, view.left_sign))];
-      if (!(nearest_m <= depth_m)) nearest_m = depth_m;
-      met[i] = true;
+      const float seen_m = depth_m < cloud.range_m ? depth_m : std::numeric_limits<float>::infinity();
+      if (!(nearest_m <= seen_m)) nearest_m = seen_m;
+      met = true;
     }
   }
-  for (std::size_t i = 0; i < kImages; ++i) {
-    if (!met[i]) continue;
+  for (std::size_t i = 0; met && i < kImages; ++i) {
     Matrix3 R_LC = Matrix3::Zero();
     R_LC(kViews[i].forward, 0) = static_cast<double>(kViews[i].forward_sign);
     R_LC(kViews[i].left, 1) = static_cast<double>(kViews[i].left_sign);
     R_LC(kViews[i].up, 2) = static_cast<double>(kViews[i].up_sign);
     PosedDepthFrame& posed = frame_[count_++];
-    posed.frame = {cloud.stamp,
-                   0,
-                   config_.pixels,
-                   config_.pixels,
-                   1.0F,
-                   cloud.range_m,
-                   depth_m_.subspan(i * pixels, pixels)};
+    posed.frame = {cloud.stamp,    0,    config_.pixels,
+                   config_.pixels, 1.0F, 1.0F,
+                   cloud.range_m,  0.0F, depth_m_.subspan(i * pixels, pixels)};
     posed.X_WC = {cloud.X_WL.R_RT.lazyProduct(R_LC), cloud.X_WL.p_RT};
     posed.is_cloud = true;
+    posed.p_BC_W = cloud.p_BL_W;
   }
   ++(count_ > 0 ? counters_.clouds : counters_.clouds_refused);
   return count_ > 0 ? Status::kOk : Status::kInvalidArgument;

@@ -16,8 +16,11 @@ namespace roborun::stages {
 struct PosedCloud {
   std::span<const std::array<float, 3>> points_L{};
   MonotonicTime stamp{};
-  float range_m{};  ///< Points farther along an image's axis are left out. (0, kMaxRange_m]
+  /// A point that is farther along an image's axis says that nothing was met within the range. (0, kMaxRange_m]
+  float range_m{};
   Pose X_WL{};
+  Vector3 p_BL_W = Vector3::Zero();  ///< From the middle of the vehicle to the sensor.
+  float range_min_m{};  ///< Points not farther than this from the sensor are left out. [0, range_m)
 };
 
 class CloudImages {
@@ -47,7 +50,8 @@ class CloudImages {
   /// aside. Points that are not finite are left out and counted. kInvalidArgument, and no images, for a cloud
   /// without a usable point, a bad range or a pose that is not finite. RT-safe: O(points + pixels).
   [[nodiscard]] Status make(const PosedCloud& cloud) noexcept;
-  /// Of the last make(), those that a point fell into; valid until the next.
+  /// Of the last make(): six, or none after a refused cloud; valid until the next. Six together see all around,
+  /// so that what lies between two of them is seen; one into which no point fell says nothing.
   [[nodiscard]] std::span<const PosedDepthFrame> frames() const noexcept { return {frame_.data(), count_}; }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 

@@ -28,7 +28,9 @@ Entry min_of(Entry a, Entry b) noexcept {
 float bridged_m(const firmware_if::DepthFrame& frame, std::size_t x, std::size_t y) noexcept {
   const std::size_t width = frame.width;
   const std::size_t i = y * width + x;
-  const auto seen_m = [&frame](std::size_t k) { return visible_depth_m(frame.depth_m[k], frame.range_m); };
+  const auto seen_m = [&frame](std::size_t k) {
+    return visible_depth_m(frame.depth_m[k], frame.range_m, frame.range_min_m);
+  };
   float nearest_m = frame.range_m;
   if (x > 0) nearest_m = std::min(nearest_m, seen_m(i - 1));
   if (x + 1 < width) nearest_m = std::min(nearest_m, seen_m(i + 1));
@@ -37,24 +39,40 @@ float bridged_m(const firmware_if::DepthFrame& frame, std::size_t x, std::size_t
   return nearest_m;
 }
 
-std::size_t entry_count(std::size_t max_side) noexcept {
+std::size_t entry_count(std::size_t width, std::size_t height) noexcept {
   constexpr std::size_t kPad = 3;  // entries are read four at a time
-  std::size_t total = 2 * max_side * max_side + DepthPyramid::kMaxLevels + kPad;
-  for (std::size_t side = max_side; side > 1;) {
-    side = (side + 1) / 2;
-    total += side * side;
+  std::size_t total = 2 * width * height + DepthPyramid::kMaxLevels + kPad;
+  while (width > 1 || height > 1) {
+    width = (width + 1) / 2;
+    height = (height + 1) / 2;
+    total += width * height;
   }
   return total;
 }
 
 }  // namespace
 
-std::size_t DepthPyramid::arena_bytes(std::size_t max_side) noexcept {
-  return entry_count(max_side) * sizeof(Entry) + alignof(std::max_align_t);
+std::size_t DepthPyramid::arena_bytes(std::size_t max_width, std::size_t max_height) noexcept {
+  return entry_count(max_width, max_height) * sizeof(Entry) + alignof(std::max_align_t);
 }
 
-DepthPyramid::DepthPyramid(core::Arena& arena, std::size_t max_side) noexcept : max_side_(max_side) {
-  memory_ = arena.take<Entry>(entry_count(max_side), "map depth pyramid");
+DepthPyramid::DepthPyramid(core::Arena& arena, std::size_t max_width, std::size_t max_height) noexcept
+    : max_width_(max_width), max_height_(max_height) {
+  memory_ = arena.take<Entry>(entry_count(max_width, max_height), "map depth pyramid");
+}
+
+void DepthPyramid::bridge_columns(const firmware_if::DepthFrame& frame, std::size_t first, std::size_t y,
+                                  unsigned shift, Entry* tile) noexcept {
+  const std::size_t end = std::min<std::size_t>(first + 8, frame.width);
+  const std::size_t bottom = std::min<std::size_t>(y + (std::size_t{1} << shift), frame.height);
+  for (std::size_t v = y; v < bottom; ++v) {
+    for (std::size_t u = first; u < end; ++u) {
+      if (frame.depth_m[v * frame.width + u] > frame.range_min_m) continue;
+      --informed_count_;
+      Entry& entry = tile[u >> shift];
+      entry = min_of(entry, entry_of(bridged_m(frame, u, v), frame.range_m, steps_per_m_));
+    }
+  }
 }
 
 void DepthPyramid::fill_tiles(const firmware_if::DepthFrame& frame, unsigned shift, Entry* tile) noexcept {
@@ -64,28 +82,25 @@ void DepthPyramid::fill_tiles(const firmware_if::DepthFrame& frame, unsigned shi
   shows_surface_ = false;
   for (std::size_t y = 0; y < frame.height; y += side, tile += columns) {
     const std::size_t rows = std::min(side, frame.height - y);
-    const DepthStrip strip{frame.depth_m.data() + y * frame.width, frame.width, rows, frame.range_m,
+    const DepthStrip strip{frame.depth_m.data() + y * frame.width,
+                           frame.width,
+                           rows,
+                           frame.range_m,
+                           frame.range_min_m,
                            steps_per_m_};
     const StripSeen seen = tile_steps(strip, static_cast<int>(shift), tile);
     shows_surface_ = shows_surface_ || seen.surface;
     informed_count_ += rows * frame.width;
-    for (std::uint64_t bits = seen.incomplete; bits != 0; bits &= bits - 1) {
-      const std::size_t first = 8 * static_cast<std::size_t>(std::countr_zero(bits));
-      const std::size_t end = std::min<std::size_t>(first + 8, frame.width);
-      for (std::size_t v = y; v < y + rows; ++v) {
-        for (std::size_t u = first; u < end; ++u) {
-          if (frame.depth_m[v * frame.width + u] > 0.0F) continue;
-          --informed_count_;
-          Entry& entry = tile[u >> shift];
-          entry = min_of(entry, entry_of(bridged_m(frame, u, v), frame.range_m, steps_per_m_));
-        }
-      }
+    for (std::size_t word = 0; word < StripSeen::kWords; ++word) {
+      for (std::uint64_t bits = seen.incomplete[word]; bits != 0; bits &= bits - 1)
+        bridge_columns(frame, 512 * word + 8 * static_cast<std::size_t>(std::countr_zero(bits)), y, shift,
+                       tile);
     }
   }
 }
 
 Status DepthPyramid::build(const firmware_if::DepthFrame& frame, int tile_shift) noexcept {
-  if (frame.width > max_side_ || frame.height > max_side_ || memory_.empty()) return Status::kCapacity;
+  if (frame.width > max_width_ || frame.height > max_height_ || memory_.empty()) return Status::kCapacity;
   steps_per_m_ = static_cast<float>(kMaxSteps - 1) / frame.range_m;
   const auto shift = static_cast<unsigned>(std::clamp(tile_shift, 0, 3));
   std::size_t width = (frame.width + (std::size_t{1} << shift) - 1) >> shift;

@@ -12,17 +12,17 @@
 
 namespace roborun::stages {
 
-/// A pixel without information (NaN or <= 0) whose neighbours above, below, left and right all have some
+/// A pixel without information (NaN or not beyond the least range) whose neighbours above, below, left and right all have some
 /// counts as the nearest of them: a camera loses one pixel in 200 at random, and near cells have thousands.
 /// Larger holes see nothing.
 ///
 /// Depths are whole steps of range / 32766, rounded so that bounds stay bounds. Level 0 holds the pixels; an
 /// entry of level k >= 1 covers 2^k x 2^k pixels and they stand 2^(k-1) apart, so that they overlap: any
 /// rectangle of up to 2^k + 2 pixels a side is covered by four of them, with less than 2^(k-1) pixels too
-/// many on each side (none at level 1). Memory from the arena: 10/3 x 4 bytes a pixel.
+/// many on each side (none at level 1). Memory from the arena: 7/3 x 4 bytes a pixel.
 class DepthPyramid {
  public:
-  static constexpr int kMaxLevels = 11;
+  static constexpr int kMaxLevels = 12;  ///< The coarsest covers kMaxImageSide pixels.
   static constexpr std::int32_t kMaxSteps = DepthEntry::kMaxSteps;
 
   using Entry = DepthEntry;
@@ -39,9 +39,9 @@ class DepthPyramid {
   };
 
   /// Bytes that the constructor takes from the arena.
-  [[nodiscard]] static std::size_t arena_bytes(std::size_t max_side) noexcept;
-  /// Room for images of up to max_side x max_side pixels.
-  DepthPyramid(core::Arena& arena, std::size_t max_side) noexcept;
+  [[nodiscard]] static std::size_t arena_bytes(std::size_t max_width, std::size_t max_height) noexcept;
+  /// Room for images of up to max_width x max_height pixels.
+  DepthPyramid(core::Arena& arena, std::size_t max_width, std::size_t max_height) noexcept;
   /// kCapacity if the image is larger than planned. `tile_shift` in [0, 3]: the finest bounds are those of
   /// tiles of 2^tile_shift pixels a side, for eyes that need no better. O(pixels).
   [[nodiscard]] Status build(const firmware_if::DepthFrame& frame, int tile_shift = 0) noexcept;
@@ -56,16 +56,19 @@ class DepthPyramid {
   /// The tiles, side by side; pixels if tile_shift was 0.
   [[nodiscard]] const Level& tiles() const noexcept { return level_[0]; }
   [[nodiscard]] float steps_per_m() const noexcept { return steps_per_m_; }
-  /// Pixels that are neither NaN nor <= 0, and whether one of them shows a surface.
+  /// Pixels with information, and whether one of them shows a surface.
   [[nodiscard]] std::size_t informed_count() const noexcept { return informed_count_; }
   [[nodiscard]] bool shows_surface() const noexcept { return shows_surface_; }
   /// Pixels [u0, u1] x [v0, v1], inside the image. Conservative. O(1).
   [[nodiscard]] Bound bound(int u0, int v0, int u1, int v1) const noexcept;
 
  private:
+  /// The pixels without information of eight columns from `first` on, in the tiles of the rows from y on.
+  void bridge_columns(const firmware_if::DepthFrame& frame, std::size_t first, std::size_t y, unsigned shift,
+                      Entry* tile) noexcept;
   void fill_tiles(const firmware_if::DepthFrame& frame, unsigned shift, Entry* tile) noexcept;
 
-  std::size_t max_side_;
+  std::size_t max_width_, max_height_;
   float steps_per_m_{0.0F};
   std::size_t informed_count_{0};
   bool shows_surface_{false};

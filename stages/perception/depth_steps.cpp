@@ -56,14 +56,16 @@ HWY_INLINE void bound_columns(const DepthStrip& strip, const float* depth, std::
     low = hn::Min(low, raw);
     high = hn::Max(high, raw);
   }
-  // As integers, what is not > 0 lies below it, and so do NaNs with a sign; the others lie above infinity.
-  if (!hn::AllTrue(di, hn::And(hn::Gt(low, hn::Zero(di)), hn::Lt(high, least_nan)))) {
-    seen.incomplete |= std::uint64_t{1} << (u / 8);
+  // As integers, what is not > range_min >= 0 lies below it, and so do NaNs with a sign; the others lie above
+  // infinity.
+  const auto nearest = hn::Set(d, strip.range_min_m);
+  if (!hn::AllTrue(di, hn::And(hn::Gt(low, hn::BitCast(di, nearest)), hn::Lt(high, least_nan)))) {
+    seen.incomplete[u / 512] |= std::uint64_t{1} << (u / 8 % 64);
     low = hn::BitCast(di, no_depth());
     high = hn::Zero(di);
     for (std::size_t v = 0; v < strip.rows; ++v) {
       const auto raw = hn::LoadU(d, depth + v * stride);
-      const auto known = hn::Gt(raw, hn::Zero(d));
+      const auto known = hn::Gt(raw, nearest);
       low = hn::Min(low, hn::BitCast(di, hn::IfThenElse(known, raw, no_depth())));
       high = hn::Max(high, hn::BitCast(di, hn::IfThenElseZero(known, raw)));
     }
@@ -142,18 +144,18 @@ StripSeen tile_steps_lanes(const DepthStrip& strip, int shift, DepthEntry* entry
   return seen;
 }
 
-std::size_t informed_pixels_lanes(std::span<const float> depth_m) {
+std::size_t informed_pixels_lanes(std::span<const float> depth_m, float range_min_m) {
   const Floats d;
   const Ints di;
   const std::size_t lanes = hn::Lanes(d);
   auto informed = hn::Zero(di);
   std::size_t i = 0;
   for (; i + lanes <= depth_m.size(); i += lanes) {
-    const auto known = hn::Gt(hn::LoadU(d, depth_m.data() + i), hn::Zero(d));
+    const auto known = hn::Gt(hn::LoadU(d, depth_m.data() + i), hn::Set(d, range_min_m));
     informed = hn::Sub(informed, hn::VecFromMask(di, hn::RebindMask(di, known)));
   }
   auto count = static_cast<std::size_t>(hn::GetLane(hn::SumOfLanes(di, informed)));
-  for (; i < depth_m.size(); ++i) count += depth_m[i] > 0.0F ? 1U : 0U;
+  for (; i < depth_m.size(); ++i) count += depth_m[i] > range_min_m ? 1U : 0U;
   return count;
 }
 
@@ -194,8 +196,8 @@ StripSeen tile_steps(const DepthStrip& strip, int shift, DepthEntry* entry) noex
   return HWY_DYNAMIC_DISPATCH(tile_steps_lanes)(strip, shift, entry);
 }
 
-std::size_t informed_pixels(std::span<const float> depth_m) noexcept {
-  return HWY_DYNAMIC_DISPATCH(informed_pixels_lanes)(depth_m);
+std::size_t informed_pixels(std::span<const float> depth_m, float range_min_m) noexcept {
+  return HWY_DYNAMIC_DISPATCH(informed_pixels_lanes)(depth_m, range_min_m);
 }
 
 void least_of_four(const DepthEntry* above, const DepthEntry* below, std::size_t stride, std::size_t count,

@@ -2,6 +2,7 @@
 /// from pixels and from each other.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -10,11 +11,12 @@ namespace roborun::stages {
 
 inline constexpr float kMaxRange_m = 300.0F;
 inline constexpr float kMaxTanHalfFov = 2.0F;
-inline constexpr std::size_t kMaxImageSide = 512;  ///< Pixels.
+inline constexpr std::size_t kMaxImageSide = 1280;  ///< Pixels.
 
-/// Visible depth of a pixel: its depth, or the range where nothing returned; 0 where there is no information.
-[[nodiscard]] inline float visible_depth_m(float depth_m, float range_m) noexcept {
-  if (!(depth_m > 0.0F)) return 0.0F;
+/// Visible depth of a pixel: its depth, or the range where nothing returned; 0 where there is no information:
+/// NaN, or not beyond range_min_m.
+[[nodiscard]] inline float visible_depth_m(float depth_m, float range_m, float range_min_m) noexcept {
+  if (!(depth_m > range_min_m)) return 0.0F;
   return depth_m < range_m ? depth_m : range_m;
 }
 
@@ -32,13 +34,15 @@ inline constexpr std::size_t kMaxTile = 8;  ///< Pixels on a side.
 struct DepthStrip {
   const float* depth_m{};
   std::size_t width{}, rows{};  ///< Pixels; at most kMaxImageSide and kMaxTile.
-  float range_m{}, steps_per_m{};
+  float range_m{}, range_min_m{}, steps_per_m{};
 };
 
 /// What a strip holds besides bounds.
 struct StripSeen {
-  std::uint64_t incomplete{};  ///< Bit i: one of the columns 8 i .. 8 i + 7 has a pixel without information.
-  bool surface{};              ///< A pixel shows a surface.
+  static constexpr std::size_t kWords = (kMaxImageSide / 8 + 63) / 64;
+  /// Bit i of all words: one of the columns 8 i .. 8 i + 7 has a pixel without information.
+  std::array<std::uint64_t, kWords> incomplete{};
+  bool surface{};  ///< A pixel shows a surface.
 };
 
 /// Sets entry[i] to the bounds of the i-th tile: 2^shift columns and all rows of the strip. A pixel without
@@ -49,7 +53,7 @@ struct StripSeen {
 void least_of_four(const DepthEntry* above, const DepthEntry* below, std::size_t stride, std::size_t count,
                    DepthEntry* to) noexcept;
 
-/// Returns how many pixels of an image have information. RT-safe: O(pixels).
-[[nodiscard]] std::size_t informed_pixels(std::span<const float> depth_m) noexcept;
+/// Returns how many pixels of an image have information: are beyond range_min_m. RT-safe: O(pixels).
+[[nodiscard]] std::size_t informed_pixels(std::span<const float> depth_m, float range_min_m) noexcept;
 
 }  // namespace roborun::stages

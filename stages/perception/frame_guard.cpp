@@ -19,7 +19,7 @@ std::uint64_t print_of(const firmware_if::DepthFrame& frame) noexcept {
   std::size_t surfaces = 0;
   for (std::size_t i = 0; i < kSamples; ++i) {
     const float depth_m = frame.depth_m[(2 * i + 1) * frame.depth_m.size() / (2 * kSamples)];
-    surfaces += depth_m > 0.0F && depth_m < frame.range_m ? 1U : 0U;
+    surfaces += depth_m > frame.range_min_m && depth_m < frame.range_m ? 1U : 0U;
     hash = core::mix64(hash ^ std::bit_cast<std::uint32_t>(depth_m));
   }
   return surfaces < kLeastSurfaces ? 0 : hash;
@@ -32,7 +32,7 @@ double seconds_between(MonotonicTime from, MonotonicTime to) noexcept {
 
 bool is_informed(const PosedDepthFrame& posed, std::size_t informed_count) noexcept {
   const auto pixels = static_cast<double>(posed.frame.depth_m.size());
-  return static_cast<double>(informed_count) >= (posed.is_cloud ? 1.0 : kLeastInformedRatio * pixels);
+  return static_cast<double>(informed_count) >= (posed.is_cloud ? 0.0 : kLeastInformedRatio * pixels);
 }
 
 }  // namespace
@@ -42,20 +42,24 @@ Status check_shape(const PosedDepthFrame& posed) noexcept {
   const bool size_ok = f.width >= 8 && f.height >= 8 && f.width <= kMaxImageSide &&
                        f.height <= kMaxImageSide &&
                        f.depth_m.size() == std::size_t{f.width} * std::size_t{f.height};
-  const bool optics_ok = f.range_m > 0.0F && f.range_m <= kMaxRange_m && f.tan_half_fov_ratio > 0.0F &&
-                         f.tan_half_fov_ratio <= kMaxTanHalfFov;
+  const bool range_ok =
+      f.range_m > 0.0F && f.range_m <= kMaxRange_m && f.range_min_m >= 0.0F && f.range_min_m < f.range_m;
+  const bool optics_ok = f.tan_half_width > 0.0F && f.tan_half_width <= kMaxTanHalfFov &&
+                         f.tan_half_height > 0.0F && f.tan_half_height <= kMaxTanHalfFov;
   const bool pose_ok = is_finite(posed.X_WC.p_RT) && posed.X_WC.R_RT.allFinite();
-  return size_ok && optics_ok && pose_ok ? Status::kOk : Status::kInvalidArgument;
+  return size_ok && range_ok && optics_ok && pose_ok ? Status::kOk : Status::kInvalidArgument;
 }
 
 Status check_frame(const PosedDepthFrame& posed) noexcept {
   if (check_shape(posed) != Status::kOk) return Status::kInvalidArgument;
-  return is_informed(posed, informed_pixels(posed.frame.depth_m)) ? Status::kOk : Status::kInvalidArgument;
+  return is_informed(posed, informed_pixels(posed.frame.depth_m, posed.frame.range_min_m))
+             ? Status::kOk
+             : Status::kInvalidArgument;
 }
 
 void FrameGuard::begin(std::span<const PosedDepthFrame> scan) noexcept {
   if (scan.empty()) return;
-  std::array<MonotonicTime, 16> stamp{};
+  std::array<MonotonicTime, 24> stamp{};
   const std::size_t count = std::min(scan.size(), stamp.size());
   for (std::size_t i = 0; i < count; ++i) stamp[i] = scan[i].frame.stamp;
   std::sort(stamp.begin(), stamp.begin() + static_cast<std::ptrdiff_t>(count));
@@ -82,7 +86,7 @@ bool FrameGuard::frozen(const firmware_if::DepthFrame& frame) noexcept {
 
 Status FrameGuard::check(const PosedDepthFrame& posed) noexcept {
   if (check_shape(posed) != Status::kOk) return Status::kInvalidArgument;
-  return check(posed, informed_pixels(posed.frame.depth_m));
+  return check(posed, informed_pixels(posed.frame.depth_m, posed.frame.range_min_m));
 }
 
 Status FrameGuard::check(const PosedDepthFrame& posed, std::size_t informed_count) noexcept {

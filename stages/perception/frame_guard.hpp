@@ -14,11 +14,11 @@ namespace roborun::stages {
 /// A half frame has at most half of its pixels; a good one loses some in a hundred.
 inline constexpr double kLeastInformedRatio = 0.6;
 
-/// kOk if a frame can be read: 8..512 pixels a side, as many depths as pixels, range in (0, kMaxRange_m] and
-/// field of view in (0, kMaxTanHalfFov], finite pose. Otherwise kInvalidArgument. RT-safe: O(1).
+/// kOk if a frame can be read: 8..1280 pixels a side, as many depths as pixels, range in (0, kMaxRange_m], least
+/// range in [0, range), both tangents of the field of view in (0, kMaxTanHalfFov], finite pose. Otherwise kInvalidArgument. RT-safe: O(1).
 [[nodiscard]] Status check_shape(const PosedDepthFrame& posed) noexcept;
 /// kOk if a frame may be used at all: check_shape(), and at least kLeastInformedRatio of the pixels (of a
-/// cloud: one) neither NaN nor <= 0. Otherwise kInvalidArgument: black, NaN, half, wrong size. RT-safe:
+/// cloud: none) with information. Otherwise kInvalidArgument: black, NaN, half, wrong size. RT-safe:
 /// O(pixels).
 [[nodiscard]] Status check_frame(const PosedDepthFrame& posed) noexcept;
 
@@ -38,7 +38,7 @@ class FrameGuard {
   void begin(std::span<const PosedDepthFrame> scan) noexcept;
   /// kOk or kInvalidArgument. The same frame again is no frozen one. RT-safe: O(pixels).
   [[nodiscard]] Status check(const PosedDepthFrame& posed) noexcept;
-  /// The same for who has counted the pixels that are neither NaN nor <= 0. Precondition: check_shape() is
+  /// The same for who has counted the pixels with information. Precondition: check_shape() is
   /// kOk. RT-safe: O(1).
   [[nodiscard]] Status check(const PosedDepthFrame& posed, std::size_t informed_count) noexcept;
 

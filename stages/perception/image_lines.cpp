@@ -15,7 +15,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace roborun::stages::HWY_NAMESPACE {
 
-void end_cells_lanes(const PixelLine& line, std::span<const float> depth_m, float range_m, SurfaceRow& row) {
+void end_cells_lanes(const PixelLine& line, std::span<const float> depth_m, const SurfaceDepths& depths,
+                     SurfaceRow& row) {
   const Floats d;
   const Ints di;
   constexpr float kBias = 4096.0F;  // makes truncation round down
@@ -25,7 +26,8 @@ void end_cells_lanes(const PixelLine& line, std::span<const float> depth_m, floa
   alignas(32) std::int32_t cell[3][kPad + kMaxImageSide + kPad];
   const auto some = [&](const float* depth, std::size_t u) {
     const auto z = hn::LoadU(d, depth);
-    auto inside = hn::RebindMask(di, hn::And(hn::Gt(z, hn::Zero(d)), hn::Lt(z, hn::Set(d, range_m))));
+    auto inside = hn::RebindMask(
+        di, hn::And(hn::Gt(z, hn::Set(d, depths.least_m)), hn::Lt(z, hn::Set(d, depths.most_m))));
     const auto far = hn::IfThenElseZero(hn::RebindMask(d, inside), z);
     const auto column = hn::ConvertTo(d, hn::Iota(di, static_cast<std::int32_t>(u)));
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -110,9 +112,9 @@ namespace roborun::stages {
 HWY_EXPORT(end_cells_lanes);
 HWY_EXPORT(tile_boxes_lanes);
 
-void end_cells(const PixelLine& line, std::span<const float> depth_m, float range_m,
+void end_cells(const PixelLine& line, std::span<const float> depth_m, const SurfaceDepths& depths,
                SurfaceRow& row) noexcept {
-  HWY_DYNAMIC_DISPATCH(end_cells_lanes)(line, depth_m, range_m, row);
+  HWY_DYNAMIC_DISPATCH(end_cells_lanes)(line, depth_m, depths, row);
 }
 
 void tile_boxes(const TileLine& line, const TileEntries& tiles, TileRow& row) noexcept {

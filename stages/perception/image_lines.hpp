@@ -21,6 +21,11 @@ struct PixelLine {
   std::array<std::int32_t, 3> low{}, high{};
 };
 
+/// The depths at which a pixel shows a surface: in (least_m, most_m).
+struct SurfaceDepths {
+  float least_m{}, most_m{};
+};
+
 /// The cells in which the pixels of a row end, from left to right; neighbours in one cell are one entry.
 struct SurfaceRow {
   static constexpr std::size_t kPad = 8;  ///< Room for whole vectors.
@@ -29,8 +34,8 @@ struct SurfaceRow {
 };
 
 /// Fills `row` with the cells in which the pixels of a line end.
-/// Precondition: at most kMaxImageSide depths, range_m at most kMaxRange_m. RT-safe: O(pixels).
-void end_cells(const PixelLine& line, std::span<const float> depth_m, float range_m,
+/// Precondition: at most kMaxImageSide depths, most_m at most kMaxRange_m. RT-safe: O(pixels).
+void end_cells(const PixelLine& line, std::span<const float> depth_m, const SurfaceDepths& depths,
                SurfaceRow& row) noexcept;
 
 /// A row of tiles in space, in cells of any size: as PixelLine, for the tiles' middles.

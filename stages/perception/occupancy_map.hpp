@@ -18,17 +18,21 @@ struct PosedDepthFrame {
   firmware_if::DepthFrame frame{};
   Pose X_WC{};
   bool is_cloud{false};  ///< Made from a cloud (cloud_images.hpp): most pixels may have no information.
+  Vector3 p_BC_W = Vector3::Zero();  ///< From the middle of the vehicle to the camera, at that instant.
 };
 
 struct IntegrationRequest {
-  std::span<const PosedDepthFrame> frames{};
-  int level{0};           ///< p0: no cell finer than cell_size_m(level) is written.
+  std::span<const PosedDepthFrame> frames{};  ///< Those of a cloud in a request of their own.
+  int level{0};                               ///< p0: no cell finer than cell_size_m(level) is written.
   double volume_m3{0.0};  ///< v0: space nearest to `trajectory_W` first, until this is spent.
   /// Points of the committed trajectory; at least the vehicle itself.
   std::span<const Vector3> trajectory_W{};
   /// Where something was seen to move lately: what the map holds near these may be gone, and an image that
   /// shows nothing there is not suspicious (own map).
   std::span<const Vector3> moved_W{};
+  /// What is unknown in a box of these half edges around the vehicle is taken to be free. Zero: nothing is. For a
+  /// vehicle that has climbed where somebody chose a place for it, and does not see above itself.
+  Vector3 assumed_half_m = Vector3::Zero();
 };
 
 struct IntegrationResult {

@@ -69,15 +69,16 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core
     }
     ++usable;
     const firmware_if::DepthFrame& frame = posed.frame;
-    const double t = static_cast<double>(frame.tan_half_fov_ratio);
-    const double pixel_area = 4.0 * t * t / (frame.width * frame.height);  // of the plane at depth 1
+    const auto across = static_cast<double>(frame.tan_half_width);
+    const auto along = static_cast<double>(frame.tan_half_height);
+    const double pixel_area = 4.0 * across * along / (frame.width * frame.height);  // of the plane at depth 1
     for (int v = 0; v < frame.height && !spent; ++v) {
-      const double z = t - (v + 0.5) * 2.0 * t / frame.height;
+      const double z = along - (v + 0.5) * 2.0 * along / frame.height;
       for (int u = 0; u < frame.width; ++u) {
         const float raw_m =
             frame.depth_m[static_cast<std::size_t>(v) * frame.width + static_cast<std::size_t>(u)];
-        if (!(raw_m > 0.0F)) continue;
-        const double y = t - (u + 0.5) * 2.0 * t / frame.width;
+        if (!(raw_m > frame.range_min_m)) continue;
+        const double y = across - (u + 0.5) * 2.0 * across / frame.width;
         const Vector3 direction_W = posed.X_WC.R_RT * Vector3(1.0, y, z);
         double depth_m = std::fmin(static_cast<double>(raw_m), static_cast<double>(frame.range_m));
         if (raw_m < frame.range_m && !add(posed.X_WC.p_RT + depth_m * direction_W, cell_m)) full = true;

@@ -7,11 +7,12 @@ namespace roborun::stages {
 void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& image,
                           const Margin& depth_margin) noexcept {
   const Matrix3 R = posed.X_WC.R_RT.transpose();
-  const auto t = static_cast<double>(posed.frame.tan_half_fov_ratio);
+  const auto across = static_cast<double>(posed.frame.tan_half_width);
+  const auto along = static_cast<double>(posed.frame.tan_half_height);
   p_WC = posed.X_WC.p_RT;
-  const auto sum_abs = [&R, t](double of_x, int row, double of_row) {
+  const auto sum_abs = [&R](double of_x, int row, double of_row) {
     double sum = 0.0;
-    for (int i = 0; i < 3; ++i) sum += std::fabs(of_x * t * R(0, i) + of_row * R(row, i));
+    for (int i = 0; i < 3; ++i) sum += std::fabs(of_x * R(0, i) + of_row * R(row, i));
     return static_cast<float>(sum);
   };
   for (int i = 0; i < 9; ++i) R_CW[static_cast<std::size_t>(i)] = static_cast<float>(R(i / 3, i % 3));
@@ -23,11 +24,13 @@ void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& imag
       child[row][i] = static_cast<float>(offset_C[static_cast<Eigen::Index>(row)]);
   }
   extent = sum_abs(0.0, 0, 1.0);
-  support = {sum_abs(1.0, 1, -1.0), sum_abs(1.0, 1, 1.0), sum_abs(1.0, 2, -1.0), sum_abs(1.0, 2, 1.0)};
-  tan_half = posed.frame.tan_half_fov_ratio;
+  support = {sum_abs(across, 1, -1.0), sum_abs(across, 1, 1.0), sum_abs(along, 2, -1.0),
+             sum_abs(along, 2, 1.0)};
+  tan_half_width = posed.frame.tan_half_width;
+  tan_half_height = posed.frame.tan_half_height;
   range_m = posed.frame.range_m;
-  columns_per_tan = static_cast<float>(0.5 * posed.frame.width / t);
-  rows_per_tan = static_cast<float>(0.5 * posed.frame.height / t);
+  columns_per_tan = static_cast<float>(0.5 * posed.frame.width / across);
+  rows_per_tan = static_cast<float>(0.5 * posed.frame.height / along);
   last_column = static_cast<float>(posed.frame.width - 1);
   last_row = static_cast<float>(posed.frame.height - 1);
   margin_m = static_cast<float>(depth_margin.constant_m);

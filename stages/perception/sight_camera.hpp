@@ -27,7 +27,7 @@ struct SightCamera {
   float extent{};  ///< Half extent of a cube of half-edge 1 along the optical axis.
   /// The same against the four sides of the field of view: left, right, up, down.
   std::array<float, 4> support{};
-  float tan_half{}, range_m{};
+  float tan_half_width{}, tan_half_height{}, range_m{};
   float columns_per_tan{}, rows_per_tan{}, last_column{}, last_row{};
   float margin_m{}, margin_quadratic_per_m{};
   const DepthPyramid* pyramid{};

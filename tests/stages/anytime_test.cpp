@@ -72,7 +72,7 @@ class Anytime : public ::testing::Test {
   Anytime() : block_(96U << 20U), arena_(block_) {
     config_.bounds_W = {Vector3(-60, -60, -3), Vector3(60, 60, 27)};
     config_.max_bricks = 2000;
-    config_.max_image_side = kPixels;
+    config_.max_image_width = config_.max_image_height = kPixels;
     map_ = std::make_unique<BrickMap>(config_, arena_);
     cloud_ = std::make_unique<PointCloud>(PointCloud::Config{}, arena_);
     planner_ = std::make_unique<RrtStar>(RrtStar::Config{}, arena_);

@@ -44,7 +44,7 @@ BrickMap::Config small_map() {
   BrickMap::Config config;
   config.bounds_W = {Vector3(-12, -12, -3), Vector3(12, 12, 7)};
   config.max_bricks = 256;
-  config.max_image_side = 32;
+  config.max_image_width = config.max_image_height = 32;
   return config;
 }
 

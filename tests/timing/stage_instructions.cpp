@@ -24,7 +24,7 @@ int main() {
   stages::BrickMap::Config map_config;
   map_config.bounds_W = {world.bounds_W().min_W - Vector3::Constant(3.0),
                          world.bounds_W().max_W + Vector3::Constant(3.0)};
-  map_config.max_image_side = camera.pixels;
+  map_config.max_image_width = map_config.max_image_height = camera.pixels;
   std::vector<std::byte> block(stages::BrickMap::arena_bytes(map_config) + stages::RrtStar::arena_bytes({}) +
                                stages::PointCloud::arena_bytes({}) + 4096);
   core::Arena arena(block);

@@ -45,7 +45,7 @@ class OwnMap {
     config_.bounds_W = {Vector3(-1.8 * range_m, -1.8 * range_m, -9.6),
                         Vector3(1.8 * range_m + 10.0, 1.8 * range_m, 1.8 * range_m + 9.6)};
     config_.max_bricks = range_m > 30.0 ? 30000 : 9100;
-    config_.max_image_side = static_cast<std::size_t>(pixels);
+    config_.max_image_width = config_.max_image_height = static_cast<std::size_t>(pixels);
     block_.resize(stages::BrickMap::arena_bytes(config_));
     reset();
   }
@@ -59,7 +59,8 @@ class OwnMap {
     const std::array<Vector3, 1> here{scan.p_WB()};
     core::UnlimitedBudget unlimited;
     stages::IntegrationResult result;
-    if (map_->integrate({scan.frames(), level, kInfinity, here}, unlimited, result) != Status::kOk) std::abort();
+    if (map_->integrate({scan.frames(), level, kInfinity, here}, unlimited, result) != Status::kOk)
+      std::abort();
     return result.work.units;
   }
   const stages::MapView& view() {
@@ -197,9 +198,16 @@ std::size_t add(const Case& c, bool all_modes) {
   std::size_t registered = 0;
   const auto measure_as = [&](const std::string& who, auto&& function) {
     // The same for all: what takes long at 0.3 m less often.
-    const int repetitions = c.level > 2 ? 60 : c.level > 1 ? 15 : c.level > 0 || c.range_m <= 20 ? 10 : c.moving ? 3 : 5;
+    const int repetitions = c.level > 2                      ? 60
+                            : c.level > 1                    ? 15
+                            : c.level > 0 || c.range_m <= 20 ? 10
+                            : c.moving                       ? 3
+                                                             : 5;
     benchmark::RegisterBenchmark(name_of(who, c).c_str(), function)
-        ->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(1)->Repetitions(once ? 1 : repetitions);
+        ->UseManualTime()
+        ->Unit(benchmark::kMillisecond)
+        ->Iterations(1)
+        ->Repetitions(once ? 1 : repetitions);
     ++registered;
   };
   measure_as("own", [c](benchmark::State& s) { own(s, c); });
@@ -209,7 +217,8 @@ std::size_t add(const Case& c, bool all_modes) {
   }
   for (const StockMode mode : kModes) {
     if (!all_modes && mode != StockMode::kPlain && mode != StockMode::kBoth) continue;
-    measure_as(std::string("stock_") + to_string(mode), [c, mode](benchmark::State& s) { stock(s, c, mode, c.level == 0); });
+    measure_as(std::string("stock_") + to_string(mode),
+               [c, mode](benchmark::State& s) { stock(s, c, mode, c.level == 0); });
   }
   return registered;
 }
@@ -243,7 +252,8 @@ class BestReporter final : public benchmark::BenchmarkReporter {
   }
   [[nodiscard]] double best_stock_ms(const Case& c) const {
     double best = kInfinity;
-    for (const StockMode mode : kModes) best = std::fmin(best, ms(name_of(std::string("stock_") + to_string(mode), c)));
+    for (const StockMode mode : kModes)
+      best = std::fmin(best, ms(name_of(std::string("stock_") + to_string(mode), c)));
     return best;
   }
   [[nodiscard]] double own_allocations() const {
@@ -266,9 +276,10 @@ Agreement agreement(int range_m) {
   insert(tree, stock_scan(scan, 0.0), StockMode::kPlain);
   std::printf("own map at %d m: %.3f bytes a known cell\n", range_m, map.bytes_per_cell());
   const Agreement result = compare(tree, map.view(), pillar_world(), scan.p_WB(), 1.8 * range_m);
-  std::printf("agreement at %d m: occupied %.5f of %zu, free %.5f of %zu; false free: own %zu of %zu, stock %zu\n", range_m,
-              result.occupied_ratio, result.stock_occupied, result.free_ratio, result.stock_free, result.own_false_free,
-              result.own_free, result.stock_false_free);
+  std::printf(
+      "agreement at %d m: occupied %.5f of %zu, free %.5f of %zu; false free: own %zu of %zu, stock %zu\n",
+      range_m, result.occupied_ratio, result.stock_occupied, result.free_ratio, result.stock_free,
+      result.own_false_free, result.own_free, result.stock_false_free);
   return result;
 }
 
@@ -292,9 +303,10 @@ std::vector<CostOfSpace> costs_of_space() {
     for (double z = -0.45; z < reach_m; z += kFinestCell_m)
       for (double y = -reach_m; y < reach_m; y += kFinestCell_m)
         for (double x = -reach_m; x < reach_m; x += kFinestCell_m)
-          cost.surface_cells += view.at(Vector3(x, y, z), lookups) == stages::CellState::kOccupied ? 1.0 : 0.0;
-    std::printf("own at %d m: %.3f ms, %.0f m3 known, %.0f surface cells\n", range_m, cost.own_ms, cost.known_m3,
-                cost.surface_cells);
+          cost.surface_cells +=
+              view.at(Vector3(x, y, z), lookups) == stages::CellState::kOccupied ? 1.0 : 0.0;
+    std::printf("own at %d m: %.3f ms, %.0f m3 known, %.0f surface cells\n", range_m, cost.own_ms,
+                cost.known_m3, cost.surface_cells);
     costs.push_back(cost);
   }
   return costs;
@@ -322,8 +334,10 @@ int main(int argc, char** argv) {
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   std::size_t registered = 0;
   for (const int range_m : {20, 40})
-    for (int level = 0; level < roborun::kPrecisionLevels; ++level) registered += add({level, range_m, 128, false}, true);
-  for (int level = 0; level < roborun::kPrecisionLevels; ++level) registered += add({level, 20, 128, true}, false);
+    for (int level = 0; level < roborun::kPrecisionLevels; ++level)
+      registered += add({level, range_m, 128, false}, true);
+  for (int level = 0; level < roborun::kPrecisionLevels; ++level)
+    registered += add({level, 20, 128, true}, false);
   registered += add({0, 40, 128, true}, false);
   for (const int pixels : {64, 256}) registered += add({0, 20, pixels, false}, false);
   BestReporter reporter;
@@ -331,15 +345,17 @@ int main(int argc, char** argv) {
   if (run < registered) return 0;  // a selection has no summary
 
   const Agreement near = agreement(20), far = agreement(40);
-  const double bytes_per_cell = std::fmax(own_map(128, 20).bytes_per_cell(), own_map(128, 40).bytes_per_cell());
+  const double bytes_per_cell =
+      std::fmax(own_map(128, 20).bytes_per_cell(), own_map(128, 40).bytes_per_cell());
   double worst = kInfinity, worst_from_images = kInfinity;
   for (const int range_m : {20, 40})
     for (int level = 0; level < roborun::kPrecisionLevels; ++level) {
       const Case c{level, range_m, 128, false};
       const double own_ms = reporter.ms(name_of("own", c)), stock_ms = reporter.best_stock_ms(c);
       worst = std::fmin(worst, stock_ms / own_ms);
-      const double from_images_ms =
-          level == 0 ? stock_ms : std::fmin(reporter.ms(name_of("cloud", c)) + stock_ms, reporter.ms(name_of("stock_pixels", c)));
+      const double from_images_ms = level == 0 ? stock_ms
+                                               : std::fmin(reporter.ms(name_of("cloud", c)) + stock_ms,
+                                                           reporter.ms(name_of("stock_pixels", c)));
       worst_from_images = std::fmin(worst_from_images, from_images_ms / own_ms);
     }
   if (!picture.empty()) {
@@ -347,8 +363,8 @@ int main(int argc, char** argv) {
     for (const int range_m : {20, 40}) {
       for (int level = 0; level < roborun::kPrecisionLevels; ++level) {
         const Case c{level, range_m, 128, false};
-        precision.push_back(
-            {range_m, roborun::cell_size_m(level), reporter.ms(name_of("own", c)), reporter.best_stock_ms(c)});
+        precision.push_back({range_m, roborun::cell_size_m(level), reporter.ms(name_of("own", c)),
+                             reporter.best_stock_ms(c)});
       }
     }
     std::ofstream file(picture);
@@ -359,18 +375,24 @@ int main(int argc, char** argv) {
       return 2;
     }
   }
-  const auto own_ms = [&](int level, int range_m) { return reporter.ms(name_of("own", {level, range_m, 128, false})); };
+  const auto own_ms = [&](int level, int range_m) {
+    return reporter.ms(name_of("own", {level, range_m, 128, false}));
+  };
   const auto plain = [&](int range_m) {
     return reporter.ms(name_of("stock_plain", {0, range_m, 128, false})) / own_ms(0, range_m);
   };
-  const auto best = [&](int range_m) { return reporter.best_stock_ms({0, range_m, 128, false}) / own_ms(0, range_m); };
+  const auto best = [&](int range_m) {
+    return reporter.best_stock_ms({0, range_m, 128, false}) / own_ms(0, range_m);
+  };
   std::printf(
-      "{\"speedup_plain_20m\":%.1f,\"speedup_plain_40m\":%.1f,\"speedup_best_20m\":%.1f,\"speedup_best_40m\":%.1f,"
+      "{\"speedup_plain_20m\":%.1f,\"speedup_plain_40m\":%.1f,\"speedup_best_20m\":%.1f,\"speedup_best_40m\":"
+      "%.1f,"
       "\"coarse_cost_ratio\":%.3f,\"worst_speedup_best_any_p0\":%.2f,"
       "\"worst_speedup_from_images_any_p0\":%.2f,\"allocations\":%.0f,\"bytes_per_cell\":%.2f,"
       "\"occupied_agreement\":%.5f,\"free_agreement\":%.5f,\"false_free_vs_stock\":%.4f}\n",
-      plain(20), plain(40), best(20), best(40), std::fmax(own_ms(4, 20) / own_ms(0, 20), own_ms(4, 40) / own_ms(0, 40)),
-      worst, worst_from_images, reporter.own_allocations(), bytes_per_cell, std::fmin(near.occupied_ratio, far.occupied_ratio),
+      plain(20), plain(40), best(20), best(40),
+      std::fmax(own_ms(4, 20) / own_ms(0, 20), own_ms(4, 40) / own_ms(0, 40)), worst, worst_from_images,
+      reporter.own_allocations(), bytes_per_cell, std::fmin(near.occupied_ratio, far.occupied_ratio),
       std::fmin(near.free_ratio, far.free_ratio),
       static_cast<double>(near.own_false_free + far.own_false_free) /
           static_cast<double>(std::max<std::size_t>(near.stock_false_free + far.stock_false_free, 1)));

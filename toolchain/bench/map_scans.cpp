@@ -18,7 +18,8 @@ sitl::World make_world() {
   description.goal_W = Vector3(20, 0, 5);
   core::CounterRng rng(14);
   while (description.pillars.size() < 60) {
-    const sitl::Pillar pillar{rng.uniform(-45.0, 45.0), rng.uniform(-45.0, 45.0), rng.uniform(0.4, 1.2), 0.0, 20.0};
+    const sitl::Pillar pillar{rng.uniform(-45.0, 45.0), rng.uniform(-45.0, 45.0), rng.uniform(0.4, 1.2), 0.0,
+                              20.0};
     if (std::fabs(pillar.y_m) > 2.5 + pillar.radius_m) description.pillars.push_back(pillar);
   }
   return sitl::World(std::move(description));
@@ -46,7 +47,8 @@ bool is_solid(const sitl::World& world, const Vector3& p_W) {
   return p_W.z() < 0.0 || world.clearance_m(p_W, 0.01) <= 0.0;
 }
 
-Scan::Scan(const sitl::World& world, int n, int pixels, double range_m) : p_WB_(n, 0.2, 5.0), range_m_(range_m) {
+Scan::Scan(const sitl::World& world, int n, int pixels, double range_m)
+    : p_WB_(n, 0.2, 5.0), range_m_(range_m) {
   const Matrix3 R_WB = attitude(n);
   const auto mounts = sitl::six_camera_mounts();
   for (std::size_t c = 0; c < 6; ++c) {
@@ -64,7 +66,7 @@ Scan::Scan(const sitl::World& world, int n, int pixels, double range_m) : p_WB_(
       }
     }
     posed.frame.width = posed.frame.height = static_cast<std::uint16_t>(pixels);
-    posed.frame.tan_half_fov_ratio = 1.0F;
+    posed.frame.tan_half_width = posed.frame.tan_half_height = 1.0F;
     posed.frame.range_m = static_cast<float>(range_m);
     posed.frame.depth_m = image_[c];
     frames_.push_back(posed);
@@ -77,7 +79,8 @@ std::vector<Vector3> Scan::points_W(double cell_m) const {
     for (int v = 0; v < posed.frame.height; ++v) {
       for (int u = 0; u < posed.frame.width; ++u) {
         const float raw_m = posed.frame.depth_m[static_cast<std::size_t>(v * posed.frame.width + u)];
-        const double depth_m = raw_m < posed.frame.range_m ? static_cast<double>(raw_m) : 1.05 * std::sqrt(3.0) * range_m_;
+        const double depth_m =
+            raw_m < posed.frame.range_m ? static_cast<double>(raw_m) : 1.05 * std::sqrt(3.0) * range_m_;
         points.push_back(posed.X_WC * (depth_m * ray_C(u, v, posed.frame.width)));
       }
     }
@@ -86,7 +89,8 @@ std::vector<Vector3> Scan::points_W(double cell_m) const {
   std::map<std::tuple<double, double, double>, std::pair<Vector3, double>> cells;
   for (const Vector3& p_W : points) {
     const auto [at, fresh] = cells.try_emplace(
-        {std::floor(p_W.x() / cell_m), std::floor(p_W.y() / cell_m), std::floor(p_W.z() / cell_m)}, Vector3(0, 0, 0), 0.0);
+        {std::floor(p_W.x() / cell_m), std::floor(p_W.y() / cell_m), std::floor(p_W.z() / cell_m)},
+        Vector3(0, 0, 0), 0.0);
     at->second.first += p_W;
     at->second.second += 1.0;
   }

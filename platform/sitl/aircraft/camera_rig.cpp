@@ -4,26 +4,53 @@
 
 namespace roborun::sitl {
 
-CameraRig::CameraRig(const World& world, const DepthCameraConfig& config, std::uint64_t seed) {
-  const auto mounts = six_camera_mounts();
-  camera_.reserve(mounts.size());
-  for (std::size_t i = 0; i < mounts.size(); ++i)
-    camera_.emplace_back(world, config, mounts[i], seed, static_cast<std::uint32_t>(i));
+SensorRig rig_of(const SimulatorConfig& config) noexcept {
+  if (config.rig) return *config.rig;
+  SensorRig rig = six_cameras(config.camera.pixels, config.camera.range_m);
+  for (CameraSpec& camera : rig.cameras) {
+    const SensorMount mount = camera.mount;
+    camera = config.camera.spec();
+    camera.mount = mount;
+  }
+  return rig;
+}
+
+CameraRig::CameraRig(const World& world, const SimulatorConfig& config, std::uint64_t seed) {
+  const SensorRig rig = rig_of(config);
+  camera_.reserve(rig.cameras.size());
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i)
+    camera_.emplace_back(world, rig.cameras[i], camera_mount(rig.cameras[i].mount), config.camera, seed,
+                         static_cast<std::uint32_t>(i));
+  lidar_.reserve(rig.lidars.size());
+  for (std::size_t i = 0; i < rig.lidars.size(); ++i)
+    lidar_.emplace_back(world, rig.lidars[i],
+                        i < config.lidar_patterns.size() ? config.lidar_patterns[i] : std::vector<LidarRay>{},
+                        config.lidar, seed, static_cast<std::uint32_t>(i));
   for (SimulatedDepthCamera& camera : camera_) cameras_.push_back(&camera);
+  for (SimulatedLidar& lidar : lidar_) lidars_.push_back(&lidar);
 }
 
 void CameraRig::expose(MonotonicTime now, const Pose& X_WB) noexcept {
   for (SimulatedDepthCamera& camera : camera_) camera.expose(now, X_WB);
+  for (SimulatedLidar& lidar : lidar_) lidar.expose(now, X_WB);
 }
 
-CameraServer::CameraServer(const World& world, const DepthCameraConfig& config, std::uint64_t seed)
+CameraServer::CameraServer(const World& world, const SimulatorConfig& config, std::uint64_t seed)
     : world_(world), rig_(world, config, seed) {
-  const std::size_t pixels = std::size_t{config.pixels} * config.pixels;
-  for (const firmware_if::DepthCamera* camera : rig_.cameras()) {
+  const SensorRig rig = rig_of(config);
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
+    const std::size_t pixels = std::size_t{rig.cameras[i].width} * rig.cameras[i].height;
     Served& served = served_.emplace_back();
-    served.mount_ = camera->mount();
+    served.mount_ = rig_.cameras()[i]->mount();
     for (std::size_t cell = 0; cell < 3; ++cell) served.box.cell(cell).depth_m.assign(pixels, 0.0F);
     cameras_.push_back(&served);
+  }
+  for (std::size_t i = 0; i < rig.lidars.size(); ++i) {
+    ServedLidar& served = served_lidar_.emplace_back();
+    served.mount_ = rig_.lidars()[i]->mount();
+    const std::size_t rays = rig_.rays(i);
+    for (std::size_t cell = 0; cell < 3; ++cell) served.box.cell(cell).points_L_m.assign(rays, {});
+    lidars_.push_back(&served);
   }
 }
 
@@ -35,23 +62,42 @@ void CameraServer::run(core::SlotId, core::LaneExecutive& lane) noexcept {
     last_p_WB_ = exposure.X_WB.p_RT;
     least_clearance_m_ = std::min(least_clearance_m_, world_.clearance_m(last_p_WB_, 2.0));
   }
-  const auto cameras = rig_.cameras();
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    firmware_if::DepthFrame frame;
-    if (cameras[i]->read(frame) != Status::kOk) continue;
-    Image& image = served_[i].box.draft();
-    std::copy(frame.depth_m.begin(), frame.depth_m.end(), image.depth_m.begin());
-    image.frame = frame;
-    image.frame.depth_m = image.depth_m;
-    served_[i].box.publish();
-    work.units += frame.depth_m.size();
-  }
+  for (std::size_t i = 0; i < cameras_.size(); ++i) serve(i, work);
+  for (std::size_t i = 0; i < lidars_.size(); ++i) serve_lidar(i, work);
   lane.describe(core::SlotId::kCameras, work);
+}
+
+void CameraServer::serve(std::size_t camera, core::Work& work) noexcept {
+  firmware_if::DepthFrame frame;
+  if (rig_.cameras()[camera]->read(frame) != Status::kOk) return;
+  Image& image = served_[camera].box.draft();
+  std::copy(frame.depth_m.begin(), frame.depth_m.end(), image.depth_m.begin());
+  image.frame = frame;
+  image.frame.depth_m = image.depth_m;
+  served_[camera].box.publish();
+  work.units += frame.depth_m.size();
+}
+
+void CameraServer::serve_lidar(std::size_t lidar, core::Work& work) noexcept {
+  firmware_if::LidarSweep read;
+  if (rig_.lidars()[lidar]->read(read) != Status::kOk) return;
+  Sweep& to = served_lidar_[lidar].box.draft();
+  std::copy(read.points_L_m.begin(), read.points_L_m.end(), to.points_L_m.begin());
+  to.sweep = read;
+  to.sweep.points_L_m = std::span(to.points_L_m).first(read.points_L_m.size());
+  served_lidar_[lidar].box.publish();
+  work.units += read.points_L_m.size();
 }
 
 Status CameraServer::Served::read(firmware_if::DepthFrame& frame) noexcept {
   if (!box.take()) return Status::kNotReady;
   frame = box.read().frame;
+  return Status::kOk;
+}
+
+Status CameraServer::ServedLidar::read(firmware_if::LidarSweep& sweep) noexcept {
+  if (!box.take()) return Status::kNotReady;
+  sweep = box.read().sweep;
   return Status::kOk;
 }
 

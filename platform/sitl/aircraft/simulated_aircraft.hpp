@@ -1,11 +1,15 @@
 /// Vehicle, motors' bus and navigation sensors of a simulated flight, and who takes pictures on the way.
 #pragma once
 
+#include <optional>
+#include <vector>
+
 #include "platform/flight/actuator_side.hpp"
 #include "platform/flight/aircraft.hpp"
 #include "platform/sitl/aircraft/simulated_actuators.hpp"
 #include "platform/sitl/fault/faulty_sensors.hpp"
 #include "platform/sitl/sensors/depth_camera.hpp"
+#include "platform/sitl/sensors/lidar.hpp"
 #include "platform/sitl/sensors/navigation_sensors.hpp"
 #include "platform/sitl/vehicle/vehicle.hpp"
 
@@ -13,10 +17,17 @@ namespace roborun::sitl {
 
 /// What is simulated, and how.
 struct SimulatorConfig {
-  DepthCameraConfig camera{};
+  DepthCameraConfig camera{};      ///< Six of them where there is no rig; with one, the noise of its cameras.
+  std::optional<SensorRig> rig{};  ///< None: six cameras.
+  LidarNoise lidar{};              ///< Of all LiDARs.
+  std::vector<std::vector<LidarRay>>
+      lidar_patterns{};  ///< By LiDAR of the rig; none or an empty one: its rings.
   NavigationSensorsConfig sensors{};
   WindConfig wind{};
 };
+
+/// The sensors that look at space.
+[[nodiscard]] SensorRig rig_of(const SimulatorConfig& config) noexcept;
 
 /// Told the true pose once a minor frame. Contract: expose() neither blocks nor allocates.
 class ExposureSink {

@@ -8,18 +8,29 @@
 
 namespace roborun::sitl {
 
-SimulatedDepthCamera::SimulatedDepthCamera(const World& world, const DepthCameraConfig& config,
-                                           const firmware_if::CameraMount& mount, std::uint64_t seed,
-                                           std::uint32_t camera)
-    : world_(world), config_(config), mount_(mount), seed_(seed), camera_(camera) {
-  const std::size_t n = config.pixels;
-  image_.resize(n * n);
-  ray_C_.reserve(n * n);
-  for (std::size_t v = 0; v < n; ++v) {
-    for (std::size_t u = 0; u < n; ++u) {
-      const double t = config.tan_half_fov_ratio;
-      const double y = -(2.0 * (static_cast<double>(u) + 0.5) / static_cast<double>(n) - 1.0) * t;
-      const double z = -(2.0 * (static_cast<double>(v) + 0.5) / static_cast<double>(n) - 1.0) * t;
+CameraSpec DepthCameraConfig::spec() const noexcept {
+  CameraSpec spec;
+  spec.width = spec.height = pixels;
+  spec.tan_half_width = spec.tan_half_height = tan_half_fov_ratio;
+  spec.range_m = range_m;
+  spec.rate_Hz = rate_Hz;
+  spec.latency_s = latency_s;
+  return spec;
+}
+
+SimulatedDepthCamera::SimulatedDepthCamera(const World& world, const CameraSpec& spec,
+                                           const firmware_if::CameraMount& mount, const DepthNoise& noise,
+                                           std::uint64_t seed, std::uint32_t camera)
+    : world_(world), spec_(spec), noise_(noise), mount_(mount), seed_(seed), camera_(camera) {
+  const std::size_t width = spec.width, height = spec.height;
+  image_.resize(width * height);
+  ray_C_.reserve(width * height);
+  for (std::size_t v = 0; v < height; ++v) {
+    for (std::size_t u = 0; u < width; ++u) {
+      const double y =
+          -(2.0 * (static_cast<double>(u) + 0.5) / static_cast<double>(width) - 1.0) * spec.tan_half_width;
+      const double z =
+          -(2.0 * (static_cast<double>(v) + 0.5) / static_cast<double>(height) - 1.0) * spec.tan_half_height;
       ray_C_.emplace_back(1.0, y, z);
     }
   }
@@ -28,7 +39,7 @@ SimulatedDepthCamera::SimulatedDepthCamera(const World& world, const DepthCamera
 void SimulatedDepthCamera::expose(MonotonicTime now, const Pose& X_WB) noexcept {
   now_ = now;
   if (now < next_) return;
-  next_ = now + from_seconds(1.0 / config_.rate_Hz);
+  next_ = now + from_seconds(1.0 / spec_.rate_Hz);
   ++taken_;
   Exposure& e = ring_[taken_ % ring_.size()];
   e.stamp = now;
@@ -36,11 +47,11 @@ void SimulatedDepthCamera::expose(MonotonicTime now, const Pose& X_WB) noexcept 
   e.X_WC = core::camera_pose(X_WB, mount_);
   core::CounterRng rng(seed_, 0x1000U + camera_);
   rng.seek(std::uint64_t{taken_});
-  e.lost = rng.uniform() < config_.frame_dropout_ratio;
+  e.lost = rng.uniform() < noise_.frame_dropout_ratio;
 }
 
 Status SimulatedDepthCamera::read(firmware_if::DepthFrame& frame) noexcept {
-  const Nanos latency = from_seconds(config_.latency_s);
+  const Nanos latency = from_seconds(spec_.latency_s);
   for (std::uint32_t sequence = taken_; sequence > last_read_ && taken_ - sequence < ring_.size();
        --sequence) {
     const Exposure& e = ring_[sequence % ring_.size()];
@@ -49,10 +60,12 @@ Status SimulatedDepthCamera::read(firmware_if::DepthFrame& frame) noexcept {
     last_read_ = sequence;
     frame = {e.stamp,
              e.sequence,
-             config_.pixels,
-             config_.pixels,
-             static_cast<float>(config_.tan_half_fov_ratio),
-             static_cast<float>(config_.range_m),
+             spec_.width,
+             spec_.height,
+             static_cast<float>(spec_.tan_half_width),
+             static_cast<float>(spec_.tan_half_height),
+             static_cast<float>(spec_.range_m),
+             static_cast<float>(spec_.range_min_m),
              image_};
     return Status::kOk;
   }
@@ -65,9 +78,9 @@ void SimulatedDepthCamera::render(const Exposure& e) noexcept {
   for (std::size_t i = 0; i < ray_C_.size(); ++i) {
     const double length = ray_C_[i].norm();
     const Vector3 direction_W = (e.X_WC.R_RT * ray_C_[i]) / length;
-    double depth_m = world_.hit_distance_m(origin_W, direction_W, config_.range_m * length, e.stamp) / length;
+    double depth_m = world_.hit_distance_m(origin_W, direction_W, spec_.range_m * length, e.stamp) / length;
     const std::uint64_t bits = rng.next();
-    if (static_cast<double>(bits >> 40U) * 0x1.0p-24 < config_.pixel_dropout_ratio) {
+    if (static_cast<double>(bits >> 40U) * 0x1.0p-24 < noise_.pixel_dropout_ratio) {
       depth_m = std::numeric_limits<double>::quiet_NaN();
     } else if (depth_m < std::numeric_limits<double>::infinity()) {
       // Sum of four 10-bit uniforms: near enough to a Gaussian, and bounded, as a matcher's error is.
@@ -75,8 +88,9 @@ void SimulatedDepthCamera::render(const Exposure& e) noexcept {
                                              ((bits >> 20U) & 1023U) + ((bits >> 30U) & 1023U));
       const double standard = (sum - 2046.0) / 591.2;
       depth_m =
-          std::fmax(0.01, depth_m + standard * (config_.noise_m + config_.noise_per_m * depth_m * depth_m));
+          std::fmax(0.01, depth_m + standard * (noise_.noise_m + noise_.noise_per_m * depth_m * depth_m));
     }
+    if (depth_m <= spec_.range_min_m) depth_m = std::numeric_limits<double>::quiet_NaN();
     image_[i] = static_cast<float>(depth_m);
   }
 }

@@ -7,31 +7,42 @@
 #include <vector>
 
 #include "core/geometry/vector.hpp"
+#include "core/sensor_rig.hpp"
 #include "firmware_if/depth_camera.hpp"
 #include "platform/sitl/world/world.hpp"
 
 namespace roborun::sitl {
 
-struct DepthCameraConfig {
-  std::uint16_t pixels{
-      96};  ///< Width and height. [8, 512]. 96: 0.5 m at 25 m, finer than the 4 m pillars by far.
-  double range_m{25.0};            ///< [1, 200]. FACTS: camera range 25 m.
-  double tan_half_fov_ratio{1.0};  ///< (0, 2]. 90 degrees.
-  double rate_Hz{20.0};            ///< [1, 100].
-  double latency_s{0.030};         ///< [0, 1]. Exposure, transfer and depth computation.
-  double noise_m{0.005};           ///< [0, 1]. One sigma at zero depth.
+/// What goes wrong in a depth camera.
+struct DepthNoise {
+  double noise_m{0.005};  ///< [0, 1]. One sigma at zero depth.
   double noise_per_m{
       0.0004};  ///< [0, 0.1]. Times depth squared: stereo with 12 cm base, 1/10 pixel matching error.
   double pixel_dropout_ratio{0.005};  ///< [0, 1]. Reads NaN.
   double frame_dropout_ratio{0.005};  ///< [0, 1]. The whole frame never arrives.
 };
 
+/// A square camera with its noise.
+struct DepthCameraConfig : DepthNoise {
+  /// Width and height. [8, 1280]. 96: 0.5 m at 25 m, finer than the 4 m pillars by far.
+  std::uint16_t pixels{96};
+  double range_m{25.0};            ///< [1, 200]. FACTS: camera range 25 m.
+  double tan_half_fov_ratio{1.0};  ///< (0, 2]. 90 degrees.
+  double rate_Hz{20.0};            ///< [1, 100].
+  double latency_s{0.030};         ///< [0, 1]. Exposure, transfer and depth computation.
+
+  [[nodiscard]] CameraSpec spec() const noexcept;
+};
+
 /// Frames are rendered only when somebody reads them; their noise depends on (seed, camera, sequence, pixel)
 /// alone, so what is read never depends on what was read before.
 class SimulatedDepthCamera final : public firmware_if::DepthCamera {
  public:
+  SimulatedDepthCamera(const World& world, const CameraSpec& spec, const firmware_if::CameraMount& mount,
+                       const DepthNoise& noise, std::uint64_t seed, std::uint32_t camera);
   SimulatedDepthCamera(const World& world, const DepthCameraConfig& config,
-                       const firmware_if::CameraMount& mount, std::uint64_t seed, std::uint32_t camera);
+                       const firmware_if::CameraMount& mount, std::uint64_t seed, std::uint32_t camera)
+      : SimulatedDepthCamera(world, config.spec(), mount, config, seed, camera) {}
 
   /// To be called at every minor frame with the true pose; takes an exposure when one is due.
   void expose(MonotonicTime now, const Pose& X_WB) noexcept;
@@ -48,7 +59,8 @@ class SimulatedDepthCamera final : public firmware_if::DepthCamera {
   void render(const Exposure& exposure) noexcept;
 
   const World& world_;
-  DepthCameraConfig config_;
+  CameraSpec spec_;
+  DepthNoise noise_;
   firmware_if::CameraMount mount_;
   std::uint64_t seed_;
   std::uint32_t camera_;

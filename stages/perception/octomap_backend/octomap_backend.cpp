@@ -82,14 +82,15 @@ class OctomapBackend final : public OccupancyMap, private MapView {
   /// clears.
   static void add_cloud(const PosedDepthFrame& posed, double cell_m, std::map<Key, Mean>& cells) {
     const firmware_if::DepthFrame& frame = posed.frame;
-    const double t = static_cast<double>(frame.tan_half_fov_ratio);
+    const auto across = static_cast<double>(frame.tan_half_width);
+    const auto along = static_cast<double>(frame.tan_half_height);
     for (int v = 0; v < frame.height; ++v) {
       for (int u = 0; u < frame.width; ++u) {
         const float raw_m =
             frame.depth_m[static_cast<std::size_t>(v) * frame.width + static_cast<std::size_t>(u)];
-        if (!(raw_m > 0.0F)) continue;
-        const Vector3 direction(1.0, t - (u + 0.5) * 2.0 * t / frame.width,
-                                t - (v + 0.5) * 2.0 * t / frame.height);
+        if (!(raw_m > frame.range_min_m)) continue;
+        const Vector3 direction(1.0, across - (u + 0.5) * 2.0 * across / frame.width,
+                                along - (v + 0.5) * 2.0 * along / frame.height);
         const double depth_m =
             raw_m < frame.range_m ? static_cast<double>(raw_m) : 1.05 * static_cast<double>(frame.range_m);
         const Vector3 p_W = posed.X_WC * (depth_m * direction);
@@ -149,19 +150,23 @@ class OctomapBackend final : public OccupancyMap, private MapView {
       }
     }
     if (!any) return Status::kInvalidArgument;
-    free_vehicle(tree, request.frames.front().X_WC.p_RT);
+    free_vehicle(tree, request.frames.front().X_WC.p_RT - request.frames.front().p_BC_W,
+                 request.assumed_half_m);
     return status;
   }
 
   /// Where the vehicle is, nothing else is: the cells that no ray can tell.
-  void free_vehicle(octomap::OcTree& tree, const Vector3& p_WB) const {
+  void free_vehicle(octomap::OcTree& tree, const Vector3& p_WB, const Vector3& assumed_half_m) const {
     const double cell_m = tree.getResolution();
-    const int n = std::max(1, static_cast<int>(std::ceil((config_.vehicle_radius_m + 0.4) / cell_m)));
+    const double reach_m = std::max(config_.vehicle_radius_m + 0.4, assumed_half_m.maxCoeff());
+    const int n = std::max(1, static_cast<int>(std::ceil(reach_m / cell_m)));
     for (int dz = -n; dz <= n; ++dz) {
       for (int dy = -n; dy <= n; ++dy) {
         for (int dx = -n; dx <= n; ++dx) {
           const Vector3 offset = cell_m * Vector3(dx, dy, dz);
-          if (offset.norm() > std::max(config_.vehicle_radius_m, 0.5 * cell_m)) continue;
+          if (offset.norm() > std::max(config_.vehicle_radius_m, 0.5 * cell_m) &&
+              (offset.cwiseAbs() - assumed_half_m).maxCoeff() > 0.0)
+            continue;
           const octomap::point3d p = to_octomap(p_WB + offset);
           if (tree.search(p) == nullptr) tree.updateNode(p, false);
         }
@@ -172,16 +177,18 @@ class OctomapBackend final : public OccupancyMap, private MapView {
   /// Space between the camera and what it sees, within the height limits of the map.
   [[nodiscard]] double seen_m3(const PosedDepthFrame& posed) const {
     const firmware_if::DepthFrame& f = posed.frame;
-    const double t = static_cast<double>(f.tan_half_fov_ratio);
-    const double area = 4.0 * t * t / (f.width * f.height);
+    const auto across = static_cast<double>(f.tan_half_width);
+    const auto along = static_cast<double>(f.tan_half_height);
+    const double area = 4.0 * across * along / (f.width * f.height);
     const double height_m = posed.X_WC.p_RT.z();
     double total_m3 = 0.0;
     for (int v = 0; v < f.height; ++v) {
       for (int u = 0; u < f.width; ++u) {
-        double depth_m = static_cast<double>(visible_depth_m(
-            f.depth_m[static_cast<std::size_t>(v) * f.width + static_cast<std::size_t>(u)], f.range_m));
-        const Vector3 d_W = posed.X_WC.R_RT * Vector3(1.0, t - (u + 0.5) * 2.0 * t / f.width,
-                                                      t - (v + 0.5) * 2.0 * t / f.height);
+        double depth_m = static_cast<double>(
+            visible_depth_m(f.depth_m[static_cast<std::size_t>(v) * f.width + static_cast<std::size_t>(u)],
+                            f.range_m, f.range_min_m));
+        const Vector3 d_W = posed.X_WC.R_RT * Vector3(1.0, across - (u + 0.5) * 2.0 * across / f.width,
+                                                      along - (v + 0.5) * 2.0 * along / f.height);
         if (d_W.z() > 0.0)
           depth_m = std::min(depth_m, std::max(config_.bounds_W.max_W.z() - height_m, 0.0) / d_W.z());
         if (d_W.z() < 0.0)

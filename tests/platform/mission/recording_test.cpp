@@ -71,6 +71,61 @@ TEST_F(Replay, IsTheSameFlightFromItsInputsAlone) {
       << "recording changed the flight";
 }
 
+/// A camera of any optics in front, a square one that looks down behind, a LiDAR on top.
+SensorRig two_cameras_and_a_lidar() {
+  SensorRig rig;
+  CameraSpec camera;
+  camera.width = 64;
+  camera.height = 40;
+  camera.tan_half_width = rig_detail::tan_of_half_deg(87.0);
+  camera.tan_half_height = rig_detail::tan_of_half_deg(58.0);
+  camera.range_min_m = 0.2;
+  camera.range_m = 12.0;
+  camera.rate_Hz = 30.0;
+  camera.mount = {0.1, 0.0, 0.3, 0.0, 5.0, 0.0};
+  (void)rig.cameras.push_back(camera);
+  CameraSpec behind;
+  behind.width = behind.height = 32;
+  behind.mount = {-0.1, 0.02, 0.3, 180.0, 33.3, 1.0};
+  (void)rig.cameras.push_back(behind);
+  LidarSpec lidar;
+  lidar.columns = 180;
+  lidar.mount.z_m = 0.2;
+  (void)rig.lidars.push_back(lidar);
+  return rig;
+}
+
+TEST_F(Replay, HoldsDifferentCamerasAndALidar) {
+  config_.simulator.rig = two_cameras_and_a_lidar();
+  const ReplayResult r = replay_flight(record(), {});
+  EXPECT_GE(recorded_.decisions, 4U);
+  EXPECT_TRUE(r.same()) << "frame " << r.diverged_in << " of " << r.recorded.minor_frames;
+  const RecordedFlight flight = Recording(config_.record).flight();
+  ASSERT_EQ(flight.mounts.size(), 2U);
+  ASSERT_EQ(flight.lidar_mounts.size(), 1U);
+  for (std::size_t i = 0; i < 2; ++i)
+    EXPECT_EQ(flight.mounts[i].R_BC, camera_mount(config_.simulator.rig->cameras[i].mount).R_BC);
+  EXPECT_EQ(flight.lidar_mounts[0].p_BC_m, (std::array<double, 3>{0.0, 0.0, 0.2}));
+  EXPECT_EQ(flight.sensors.cameras[0].width, 64);
+  EXPECT_EQ(flight.sensors.cameras[0].height, 40);
+  EXPECT_EQ(flight.sensors.cameras[0].range_min_m, 0.2);
+  EXPECT_NEAR(flight.sensors.cameras[0].tan_half_width, config_.simulator.rig->cameras[0].tan_half_width,
+              1e-12);
+  EXPECT_EQ(flight.sensors.cameras[1].mount.pitch_deg, 33.3);
+  EXPECT_EQ(flight.sensors.lidars[0].columns, 180);
+  EXPECT_EQ(flight.flight.camera_range_m, 12.0);
+  int images = 0, sweeps = 0;
+  for (Recording recording(config_.record); recording.kind() != RecordKind::kEnd; recording.next()) {
+    images += recording.kind() == RecordKind::kDepth ? 1 : 0;
+    sweeps += recording.kind() == RecordKind::kLidar ? 1 : 0;
+  }
+  EXPECT_GT(images, 4);
+  EXPECT_GT(sweeps, 3);
+  config_.record.clear();
+  EXPECT_EQ(fly_mission(world_, config_, {}).result.state_hash, recorded_.state_hash)
+      << "recording changed the flight";
+}
+
 TEST_F(Replay, AnswersToFaultsAndKeepsTheFenceAsTheRecordedFlightDid) {
   ASSERT_EQ(config_.flight.fence.set_altitude(-5.0, 9.0), core::FenceFault::kNone);
   ASSERT_EQ(config_.flight.fence.add_circle(core::FenceSide::kKeepIn, {20.0, 0.0}, 500.0),
@@ -134,7 +189,7 @@ TEST_F(Replay, RefusesAConfigurationThatNobodyWrote) {
   // The checksum is no secret: whoever makes a file can make it fit. What is in it is checked all the same.
   const auto refused = [&](const char* wanted, const MissionConfig& config) {
     const std::string path = test::scratch("config.rec");
-    sitl::CameraRig rig(world_, config_.simulator.camera, 1);
+    sitl::CameraRig rig(world_, config_.simulator, 1);
     sitl::SimulatedAircraft aircraft(config_.simulator, ground_below(world_), 1, core::kMinorFrame, rig);
     { FlightRecorder recorder(path, flight_config_of(world_, config), config, aircraft, rig.cameras()); }
     try {

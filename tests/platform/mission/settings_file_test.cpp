@@ -40,5 +40,25 @@ TEST(Settings, RefusesWithFileLineKeyAndRange) {
   }
 }
 
+TEST(Settings, CameraAndFogGoForAllCamerasOfARig) {
+  const std::string path = test::scratch("rig.toml");
+  MissionConfig config;
+  SensorRig& rig = config.simulator.rig.emplace(six_cameras(96, 25.0));
+  rig.cameras[1].range_m = 6.0;
+  rig.cameras[1].rate_Hz = 30.0;
+  (void)rig.lidars.push_back({});
+  std::ofstream(path) << "[camera]\npixels = 48\nlatency_s = 0.1\n[fog]\nvisibility_m = 9.0\n";
+  load_settings(path, config);
+  for (const CameraSpec& camera : rig.cameras) {
+    EXPECT_EQ(camera.width, 48);
+    EXPECT_EQ(camera.height, 48);
+    EXPECT_EQ(camera.latency_s, 0.1);
+  }
+  EXPECT_EQ(rig.cameras[0].range_m, 9.0);
+  EXPECT_EQ(rig.cameras[1].range_m, 6.0) << "it sees less than the fog lets it";
+  EXPECT_EQ(rig.cameras[1].rate_Hz, 30.0) << "nobody spoke of it";
+  EXPECT_EQ(rig.lidars[0].range_m, 9.0);
+}
+
 }  // namespace
 }  // namespace roborun::mission

@@ -46,6 +46,9 @@ class BlockSight : public ::testing::Test {
 
 TEST_F(BlockSight, IsBitEqualOnEveryInstructionSet) {
   const std::array<Vector3, 1> here{Vector3(0.1, 0.2, 5.0)};
+  frames_[1].frame.tan_half_height = 0.6F;
+  frames_[3].frame.tan_half_width = 1.3F;
+  frames_[2].frame.range_min_m = 3.0F;
   std::vector<std::uint64_t> digests;
   int sets = 0;
   const std::int64_t all = kernel_instruction_sets();
@@ -58,7 +61,7 @@ TEST_F(BlockSight, IsBitEqualOnEveryInstructionSet) {
       BrickMap::Config config;
       config.bounds_W = {Vector3(-30, -30, -3), Vector3(30, 30, 12)};
       config.max_bricks = 2000;
-      config.max_image_side = 64;
+      config.max_image_width = config.max_image_height = 64;
       std::vector<std::byte> block(BrickMap::arena_bytes(config));
       core::Arena arena(block);
       BrickMap map(config, arena);
@@ -89,7 +92,8 @@ TEST_F(BlockSight, ATileKnowsTheLeastAndTheMostOfItsDepths) {
     const std::int64_t set = all & (std::int64_t{1} << rng.below(63));
     if (set == 0) continue;
     const InstructionSet only(set);
-    const std::size_t width = 8 + rng.below(n % 8 == 0 ? 505 : 60), rows = 1 + rng.below(kMaxTile);
+    const std::size_t width = 8 + rng.below(n % 8 == 0 ? kMaxImageSide - 7 : 60),
+                      rows = 1 + rng.below(kMaxTile);
     const auto shift = static_cast<int>(rng.below(4));
     std::vector<float> depth_m(width * rows);
     const std::uint64_t odd_in = n % 3 == 0 ? 4 : 100;
@@ -99,8 +103,8 @@ TEST_F(BlockSight, ATileKnowsTheLeastAndTheMostOfItsDepths) {
                       tiles = (width + side - 1) / side;
     std::vector<DepthPyramid::Entry> entry(tiles);
     const StripSeen seen =
-        tile_steps({depth_m.data(), width, rows, kRange_m, steps_per_m}, shift, entry.data());
-    std::uint64_t incomplete = 0;
+        tile_steps({depth_m.data(), width, rows, kRange_m, 0.0F, steps_per_m}, shift, entry.data());
+    std::array<std::uint64_t, StripSeen::kWords> incomplete{};
     bool surface = false;
     for (std::size_t x = 0; x < tiles; ++x) {
       std::int32_t least = DepthPyramid::kMaxSteps, not_most = DepthPyramid::kMaxSteps;
@@ -108,7 +112,7 @@ TEST_F(BlockSight, ATileKnowsTheLeastAndTheMostOfItsDepths) {
         for (std::size_t u = x * side; u < std::min((x + 1) * side, width); ++u) {
           const float d = depth_m[v * width + u];
           if (!(d > 0.0F)) {
-            incomplete |= std::uint64_t{1} << (u / 8);
+            incomplete[u / 512] |= std::uint64_t{1} << (u / 8 % 64);
             continue;
           }
           const auto steps = static_cast<std::int32_t>(d < kRange_m ? d * steps_per_m : 0.0F);
@@ -126,9 +130,9 @@ TEST_F(BlockSight, ATileKnowsTheLeastAndTheMostOfItsDepths) {
 }
 
 TEST_F(BlockSight, ABlockIsFreeOnlyIfEveryRayThroughItSeesPastIt) {
-  std::vector<std::byte> block(DepthPyramid::arena_bytes(45));
+  std::vector<std::byte> block(DepthPyramid::arena_bytes(45, 45));
   core::Arena arena(block);
-  DepthPyramid image(arena, 45);
+  DepthPyramid image(arena, 45, 45);
   ASSERT_EQ(image.build(frames_[0].frame), Status::kOk);
   SightCameras cameras;
   cameras.camera[0].prepare(frames_[0], image, {0.05, 0.0012});
@@ -184,13 +188,13 @@ void see_slowly(const SightCameras& cameras, const SightBlock& block, std::uint3
 }
 
 TEST_F(BlockSight, ABrickIsSeenAsItsBlocksOneByOne) {
-  std::vector<std::byte> block(6 * DepthPyramid::arena_bytes(45));
+  std::vector<std::byte> block(6 * DepthPyramid::arena_bytes(45, 45));
   core::Arena arena(block);
   std::array<std::optional<DepthPyramid>, 6> image;
   SightCameras cameras;
   for (cameras.count = 0; cameras.count < 6; ++cameras.count) {
     const PosedDepthFrame& frame = frames_[cameras.count];
-    image[cameras.count].emplace(arena, 45);
+    image[cameras.count].emplace(arena, 45, 45);
     ASSERT_EQ(image[cameras.count]->build(frame.frame), Status::kOk);
     cameras.camera[cameras.count].prepare(frame, *image[cameras.count], {0.05, 0.0012});
   }
@@ -237,7 +241,7 @@ TEST_F(BlockSight, TheCellsOfARowAreWhereItsPixelsEnd) {
   }
   const auto depths = down.frame.depth_m.subspan(22 * 45, 45);
   auto row = std::make_unique<SurfaceRow>();
-  end_cells(line, depths, down.frame.range_m, *row);
+  end_cells(line, depths, {0.0F, down.frame.range_m}, *row);
   ASSERT_GT(row->count, 5U);
   std::size_t found = 0;
   for (std::size_t n = 0; n < row->count; ++n) {

@@ -90,7 +90,7 @@ class BrickMapTest : public ::testing::Test {
   explicit BrickMapTest(std::size_t max_bricks = 2000) : block_(64U << 20U), arena_(block_) {
     config_.bounds_W = {Vector3(-30, -30, -3), Vector3(30, 30, 12)};
     config_.max_bricks = max_bricks;
-    config_.max_image_side = 64;
+    config_.max_image_width = config_.max_image_height = 64;
     sut_ = std::make_unique<BrickMap>(config_, arena_);
     scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)},
                     {Vector3(6, -2, 0), Vector3(8, 2, 12)},
@@ -512,12 +512,12 @@ TEST(DepthPyramid, BoundsEveryRectangle) {
   firmware_if::DepthFrame frame;
   frame.width = 96;
   frame.height = 80;
-  frame.tan_half_fov_ratio = 1.0F;
+  frame.tan_half_width = frame.tan_half_height = 1.0F;
   frame.range_m = 25.0F;
   frame.depth_m = depth;
   std::vector<std::byte> block(1U << 20U);
   core::Arena arena(block);
-  DepthPyramid sut(arena, 96);
+  DepthPyramid sut(arena, 96, 80);
   for (int n = 0; n < 4000; ++n) {
     if (n % 1000 == 0) {
       ASSERT_EQ(sut.build(frame, n / 1000), Status::kOk);

@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "core/geometry/math.hpp"
 #include "stages/perception/brick_map.hpp"
 #include "stages/perception/point_cloud.hpp"
 #include "tests/stages/perception/scene.hpp"
@@ -69,7 +70,7 @@ TEST_F(CloudImagesTest, CloudsGoIntoTheSameMapAndPointCloud) {
   BrickMap::Config config;
   config.bounds_W = {Vector3(-30, -30, -3), Vector3(30, 30, 12)};
   config.max_bricks = 2000;
-  config.max_image_side = 64;
+  config.max_image_width = config.max_image_height = 64;
   BrickMap map(config, arena_);
   PointCloud cloud({}, arena_);
   ASSERT_FALSE(arena_.exhausted());
@@ -99,11 +100,61 @@ TEST_F(CloudImagesTest, CloudsGoIntoTheSameMapAndPointCloud) {
   EXPECT_EQ(map.view().at(Vector3(10.0, 0.2, 3.0), lookups), CellState::kUnknown) << "behind the pillar";
 }
 
+TEST_F(CloudImagesTest, ABandOfRaysSeesABandAllAround) {
+  // 1.4 degrees apart, 20 degrees up and down, into a round room of 12 m that is 100 m high.
+  std::vector<std::array<float, 3>> band;
+  for (int ring = -14; ring <= 14; ++ring)
+    for (int column = 0; column < 360; ++column) {
+      const double up = ring * 1.4 * core::kPi / 180.0, turn = column * core::kPi / 180.0;
+      band.push_back({static_cast<float>(12.0 * std::cos(turn)), static_cast<float>(12.0 * std::sin(turn)),
+                      static_cast<float>(12.0 * std::tan(up))});
+    }
+  BrickMap::Config config;
+  config.bounds_W = {Vector3(-30, -30, -12), Vector3(30, 30, 12)};
+  config.max_bricks = 3000;
+  config.max_image_width = config.max_image_height = 64;
+  BrickMap map(config, arena_);
+  ASSERT_FALSE(arena_.exhausted());
+  const std::array<Vector3, 1> here{Vector3::Zero()};
+  IntegrationResult result;
+  core::Work work;
+  ASSERT_EQ(sut_.make({band, {}, 20.0F, {}}), Status::kOk);
+  ASSERT_EQ(sut_.frames().size(), CloudImages::kImages);
+  ASSERT_EQ(map.integrate({sut_.frames(), 0, 1e18, here}, unlimited_, result), Status::kOk);
+  (void)map.export_view({0, 1e18, here[0]}, unlimited_, work);
+  std::uint64_t lookups = 0;
+  int free = 0;
+  for (int column = 0; column < 72; ++column) {
+    // In steps of 5 degrees, the borders of the images among them.
+    const double turn = column * core::kPi / 36.0, x = 6.0 * std::cos(turn), y = 6.0 * std::sin(turn);
+    free += map.view().at(Vector3(x, y, 0.1), lookups) == CellState::kFree ? 1 : 0;
+    EXPECT_EQ(map.view().at(Vector3(x, y, 4.0), lookups), CellState::kUnknown) << "above the band";
+    EXPECT_EQ(map.view().at(Vector3(x, y, -4.0), lookups), CellState::kUnknown) << "below the band";
+    EXPECT_EQ(map.view().at(Vector3(2.2 * x, 2.2 * y, 0.1), lookups), CellState::kUnknown)
+        << "behind the wall";
+  }
+  EXPECT_EQ(free, 72);
+  EXPECT_EQ(map.view().at(Vector3(0.1, 0.1, 3.0), lookups), CellState::kUnknown) << "straight up";
+}
+
+TEST_F(CloudImagesTest, FarPointsClearAndNearOnesSayNothing) {
+  const auto depth_of = [&](std::array<float, 3> p) {
+    const std::vector<std::array<float, 3>> points{p, {0.0F, 5.0F, 0.0F}};
+    EXPECT_EQ(sut_.make({points, {}, 20.0F, {}, Vector3::Zero(), 0.5F}), Status::kOk);
+    for (const float depth_m : sut_.frames()[0].frame.depth_m)
+      if (depth_m > 0.0F) return depth_m;
+    return -1.0F;
+  };
+  EXPECT_EQ(depth_of({7.0F, 0.0F, 0.0F}), 7.0F);
+  EXPECT_EQ(depth_of({50.0F, 0.0F, 0.0F}), std::numeric_limits<float>::infinity());
+  EXPECT_EQ(depth_of({0.4F, 0.0F, 0.0F}), -1.0F);
+}
+
 TEST_F(CloudImagesTest, NoPointsAreNoScan) {
   EXPECT_EQ(sut_.make({{}, {}, 20.0F, X_WL_}), Status::kInvalidArgument);
   EXPECT_TRUE(sut_.frames().empty());
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-  const std::vector<std::array<float, 3>> bad{{kNan, 1, 1}, {1, kNan, 1}, {0, 0, 0}, {50, 0, 0}};
+  const std::vector<std::array<float, 3>> bad{{kNan, 1, 1}, {1, kNan, 1}, {0, 0, 0}, {0, 0, 0}};
   EXPECT_EQ(sut_.make({bad, {}, 20.0F, X_WL_}), Status::kInvalidArgument);
   EXPECT_EQ(sut_.counters().points_refused, 2U);
   EXPECT_EQ(sut_.make({point_, {}, kNan, X_WL_}), Status::kInvalidArgument);

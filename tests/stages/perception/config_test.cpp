@@ -44,7 +44,7 @@ TEST(BrickMapConfigDeathTest, OnlyValidOnesAreMade) {
   Config small;
   small.bounds_W = {Vector3(-10, -10, 0), Vector3(10, 10, 10)};
   small.max_bricks = 64;
-  small.max_image_side = 64;
+  small.max_image_width = small.max_image_height = 64;
   const std::size_t bytes = BrickMap::arena_bytes(small);
   test::expect_only_valid_configs<Config>(
       small, [bytes](const Config& config) { make_in<BrickMap>(bytes, config); },
@@ -53,7 +53,9 @@ TEST(BrickMapConfigDeathTest, OnlyValidOnesAreMade) {
        {"bricks", [](Config& c) { c.max_bricks = 63; }},
        {"no camera", [](Config& c) { c.max_frames = 0; }},
        {"cameras", [](Config& c) { c.max_frames = kMaxCameras + 1; }},
-       {"pixels", [](Config& c) { c.max_image_side = 513; }},
+       {"columns", [](Config& c) { c.max_image_width = 1281; }},
+       {"rows", [](Config& c) { c.max_image_height = 7; }},
+       {"more all around than there are", [](Config& c) { c.all_around_frames = c.max_frames + 1; }},
        {"radius", [](Config& c) { c.vehicle_radius_m = -0.1; }},
        {"margin", [](Config& c) { c.depth_margin_m = kNan; }},
        {"quadratic margin", [](Config& c) { c.depth_margin_quadratic_per_m = -0.1; }}});

@@ -110,7 +110,7 @@ class GuardedMap : public ::testing::Test {
     BrickMap::Config config;
     config.bounds_W = {Vector3(-30, -30, -3), Vector3(30, 30, 12)};
     config.max_bricks = 2000;
-    config.max_image_side = 64;
+    config.max_image_width = config.max_image_height = 64;
     sut_ = std::make_unique<BrickMap>(config, arena_);
     scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)}, {Vector3(6, -2, 0), Vector3(8, 2, 12)}};
   }

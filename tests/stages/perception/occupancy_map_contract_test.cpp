@@ -20,7 +20,7 @@ class OccupancyMapContract : public ::testing::TestWithParam<const char*> {
       BrickMap::Config config;
       config.bounds_W = bounds;
       config.max_bricks = 2000;
-      config.max_image_side = 64;
+      config.max_image_width = config.max_image_height = 64;
       sut_ = std::make_unique<BrickMap>(config, arena_);
     } else {
       sut_ = make_octomap_backend({.bounds_W = bounds});

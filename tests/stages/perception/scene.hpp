@@ -64,7 +64,7 @@ struct Scene {
       }
       frames[c].frame.width = static_cast<std::uint16_t>(pixels);
       frames[c].frame.height = static_cast<std::uint16_t>(rows);
-      frames[c].frame.tan_half_fov_ratio = 1.0F;
+      frames[c].frame.tan_half_width = frames[c].frame.tan_half_height = 1.0F;
       frames[c].frame.range_m = range_m;
       frames[c].frame.depth_m = image[c];
     }

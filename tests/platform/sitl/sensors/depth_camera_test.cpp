@@ -127,6 +127,43 @@ TEST(DepthCamera, LosesTheShareOfFramesThatItIsTold) {
   EXPECT_NEAR(got / 2000.0, 0.8, 0.03);
 }
 
+TEST(DepthCamera, HasOpticsOfItsOwn) {
+  const World world = one_wall();
+  CameraSpec spec = exact().spec();
+  spec.width = 32;
+  spec.height = 12;
+  spec.tan_half_width = 1.2;
+  spec.tan_half_height = 0.3;
+  spec.range_min_m = 9.0;
+  for (const double range_min_m : {9.0, 10.5}) {
+    spec.range_min_m = range_min_m;
+    SimulatedDepthCamera camera(world, spec, six_camera_mounts()[0], exact(), 1, 0);
+    firmware_if::DepthFrame frame;
+    for (MonotonicTime now{}; now < MonotonicTime{Nanos{100'000'000}}; now += kFrame)
+      camera.expose(now, kAt5m);
+    ASSERT_EQ(camera.read(frame), Status::kOk);
+    EXPECT_EQ(frame.width, 32);
+    EXPECT_EQ(frame.height, 12);
+    EXPECT_EQ(frame.tan_half_width, 1.2F);
+    EXPECT_EQ(frame.tan_half_height, 0.3F);
+    EXPECT_EQ(frame.range_min_m, static_cast<float>(range_min_m));
+    ASSERT_EQ(frame.depth_m.size(), 32U * 12U);
+    for (const float depth_m : frame.depth_m) {
+      if (range_min_m < 10.0) {
+        EXPECT_NEAR(depth_m, 10.0, 1e-4) << "the wall, in the whole image";
+      } else {
+        EXPECT_TRUE(std::isnan(depth_m)) << "too near";
+      }
+    }
+  }
+}
+
+TEST(DepthCamera, TheRigOfSixStandsWhereTheirMountsSay) {
+  const SensorRig rig = six_cameras(96, 25.0);
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i)
+    EXPECT_EQ(camera_mount(rig.cameras[i].mount).R_BC, six_camera_mounts()[i].R_BC);
+}
+
 TEST(DepthCamera, SixCamerasSeeTheWholeSphere) {
   for (double a = 0.0; a < 6.28; a += 0.1) {
     for (double b = -1.5; b < 1.5; b += 0.1) {

@@ -1,0 +1,45 @@
+#include "platform/flight/gaze.hpp"
+
+#include <algorithm>
+
+#include "core/geometry/math.hpp"
+
+namespace roborun::flight {
+namespace {
+
+constexpr double kMoves_mps = 0.3;  // slower than that a direction means little
+
+}  // namespace
+
+void Gaze::turn_on() noexcept { yaw_rad_ = core::wrap_angle(yaw_rad_ + period_s_ * config_.yaw_rate_radps); }
+
+void Gaze::turn_to(double target_rad) noexcept {
+  const double most_rad = period_s_ * config_.yaw_rate_radps;
+  const double left_rad = core::wrap_angle(target_rad - yaw_rad_);
+  yaw_rad_ = core::wrap_angle(yaw_rad_ + std::clamp(left_rad, -most_rad, most_rad));
+}
+
+double Gaze::step(const Input& in) noexcept {
+  if (!config_.follows) return yaw_rad_;
+  const MonotonicTime ends = in.committed.start_time + from_seconds(in.committed.duration_s());
+  if (!ready_) {
+    if (in.now < ends) return yaw_rad_;  // still climbing
+    turn_on();
+    turned_rad_ += period_s_ * config_.yaw_rate_radps;
+    ready_ = turned_rad_ >= 2.0 * core::kPi;
+    still_since_ = in.now;
+    return yaw_rad_;
+  }
+  const Vector3 v_W = in.committed.at(in.now + from_seconds(config_.lead_s)).v_W;
+  const bool moves = core::hypot2(v_W.x(), v_W.y()) > kMoves_mps;
+  if (moves || in.committed_number != number_ || in.now < ends) still_since_ = in.now;
+  number_ = in.committed_number;
+  if (moves) {
+    turn_to(core::atan2(v_W.y(), v_W.x()));
+  } else if (in.now - still_since_ >= from_seconds(config_.stuck_s)) {
+    turn_on();
+  }
+  return yaw_rad_;
+}
+
+}  // namespace roborun::flight

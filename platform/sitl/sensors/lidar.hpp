@@ -1,0 +1,72 @@
+/// A simulated LiDAR: rings or a pattern of rays, cast at one instant, with noise, dropouts and latency.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/geometry/vector.hpp"
+#include "core/sensor_rig.hpp"
+#include "firmware_if/lidar.hpp"
+#include "platform/sitl/world/world.hpp"
+
+namespace roborun::sitl {
+
+/// What goes wrong in a LiDAR.
+struct LidarNoise {
+  double noise_m{0.015};              ///< [0, 1]. One sigma, the same at all distances.
+  double point_dropout_ratio{0.005};  ///< [0, 1]. Such a ray is not in the sweep.
+  double sweep_dropout_ratio{0.005};  ///< [0, 1]. The whole sweep never arrives.
+};
+
+/// One direction of a pattern.
+struct LidarRay {
+  double azimuth_deg{}, elevation_deg{};
+};
+/// The rays of a file: lines "azimuth_deg elevation_deg", both within 360 and 90; "#" begins a comment. Throws
+/// InputError with file and line; 65,536 rays at most.
+[[nodiscard]] std::vector<LidarRay> load_lidar_pattern(const std::string& path);
+/// What a pattern needs of a rig: its elevations, and as many rings and columns as say how dense it is.
+[[nodiscard]] LidarSpec spec_of(const std::vector<LidarRay>& pattern, const LidarSpec& rest);
+
+/// Sweeps are cast only when somebody reads them; their noise depends on (seed, sensor, sequence, ray) alone, so what
+/// is read never depends on what was read before. A ray that meets nothing says so (firmware_if/lidar.hpp).
+class SimulatedLidar final : public firmware_if::Lidar {
+ public:
+  /// An empty pattern: the rings of the spec.
+  SimulatedLidar(const World& world, const LidarSpec& spec, const std::vector<LidarRay>& pattern,
+                 const LidarNoise& noise, std::uint64_t seed, std::uint32_t lidar);
+
+  /// To be called at every minor frame with the true pose; takes a sweep when one is due.
+  void expose(MonotonicTime now, const Pose& X_WB) noexcept;
+  [[nodiscard]] Status read(firmware_if::LidarSweep& sweep) noexcept override;
+  [[nodiscard]] const firmware_if::CameraMount& mount() const noexcept override { return mount_; }
+  [[nodiscard]] std::size_t rays() const noexcept { return ray_L_.size(); }
+
+ private:
+  struct Exposure {
+    MonotonicTime stamp{};
+    std::uint32_t sequence{};
+    Pose X_WL{};
+    bool lost{};
+  };
+  void cast(const Exposure& exposure) noexcept;
+
+  const World& world_;
+  LidarSpec spec_;
+  LidarNoise noise_;
+  firmware_if::CameraMount mount_;
+  std::uint64_t seed_;
+  std::uint32_t lidar_;
+  std::vector<Vector3> ray_L_;  ///< Of length 1.
+  std::vector<std::array<float, 3>> point_L_m_;
+  std::size_t points_{0};
+  std::array<Exposure, 32> ring_{};
+  std::uint32_t taken_{0};
+  std::uint32_t last_read_{0};
+  MonotonicTime now_{};
+  MonotonicTime next_{};
+};
+
+}  // namespace roborun::sitl

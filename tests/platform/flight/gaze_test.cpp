@@ -1,0 +1,81 @@
+#include "platform/flight/gaze.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/geometry/math.hpp"
+
+namespace roborun::flight {
+namespace {
+
+constexpr double kPeriod_s = 0.0025;
+
+/// Straight on at a constant velocity for so long.
+Trajectory straight(const Vector3& v_W, double duration_s, MonotonicTime start) {
+  Trajectory t;
+  t.start_time = start;
+  t.segment_count = 1;
+  t.segment[0].duration_s = duration_s;
+  t.segment[0].coefficient[1] = v_W;
+  return t;
+}
+
+class GazeTest : public ::testing::Test {
+ protected:
+  /// Runs for so long; every step is within the yaw rate. Returns the last yaw.
+  double run(Gaze& sut, const Trajectory& flown, double for_s) {
+    for (double t = 0.0; t < for_s; t += kPeriod_s) {
+      now_ += from_seconds(kPeriod_s);
+      const double yaw = sut.step({now_, flown, number_});
+      EXPECT_LE(std::fabs(core::wrap_angle(yaw - yaw_)), kPeriod_s * config_.yaw_rate_radps + 1e-12);
+      turned_ += core::wrap_angle(yaw - yaw_);
+      yaw_ = yaw;
+    }
+    return yaw_;
+  }
+  GazeConfig config_{.follows = true};
+  MonotonicTime now_{};
+  std::uint64_t number_{1};
+  double yaw_{0.5}, turned_{0.0};
+};
+
+TEST_F(GazeTest, KeepsItsYawWhereEverythingIsSeen) {
+  Gaze sut({}, kPeriod_s);
+  sut.begin(0.5);
+  EXPECT_TRUE(sut.ready());
+  EXPECT_EQ(run(sut, straight({0, 3, 0}, 5.0, now_), 20.0), 0.5);
+}
+
+TEST_F(GazeTest, LooksRoundOnceAfterTheClimbAndIsReadyThen) {
+  Gaze sut(config_, kPeriod_s);
+  sut.begin(0.5);
+  const Trajectory climb = straight({0, 0, 1.5}, 3.0, now_);
+  EXPECT_EQ(run(sut, climb, 2.9), 0.5) << "not while it climbs";
+  EXPECT_FALSE(sut.ready());
+  (void)run(sut, climb, 2.0 * core::kPi / config_.yaw_rate_radps - 0.5);
+  EXPECT_FALSE(sut.ready());
+  (void)run(sut, climb, 1.0);
+  EXPECT_TRUE(sut.ready());
+  EXPECT_NEAR(turned_, 2.0 * core::kPi, 0.01);
+}
+
+TEST_F(GazeTest, LooksWhereItFliesAndRoundWhenItIsStuck) {
+  Gaze sut(config_, kPeriod_s);
+  sut.begin(0.5);
+  (void)run(sut, straight({0, 0, 1.5}, 0.1, now_), 9.0);
+  ASSERT_TRUE(sut.ready());
+  ++number_;
+  const Trajectory left = straight({0, 2, 0}, 10.0, now_);
+  EXPECT_NEAR(run(sut, left, 5.0), 0.5 * core::kPi, 1e-6);
+  ++number_;
+  const Trajectory back = straight({-2, -0.01, 0}, 5.0, now_);
+  EXPECT_NEAR(run(sut, back, 4.0), core::atan2(-0.01, -2.0), 1e-6);
+  EXPECT_NEAR(run(sut, back, 3.5), core::atan2(-0.01, -2.0), 1e-6) << "it hovers, for less than 3 s";
+  turned_ = 0.0;
+  (void)run(sut, back, 10.0);
+  EXPECT_GT(turned_, 2.0 * core::kPi);
+}
+
+}  // namespace
+}  // namespace roborun::flight

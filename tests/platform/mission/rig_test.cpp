@@ -1,0 +1,127 @@
+/// Flights with other sensors than six cameras.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <limits>
+#include <string>
+
+#include "platform/board/board_profile.hpp"
+#include "platform/input/input_error.hpp"
+#include "platform/mission/mission.hpp"
+#include "platform/mission/replay.hpp"
+#include "platform/sitl/world/world_file.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace roborun::mission {
+namespace {
+
+class RigFlight : public ::testing::Test {
+ protected:
+  RigFlight() : world_(sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {})) {
+    config_.flight.costs = board::paper().costs;
+    config_.flight.model = board::paper().model;
+    config_.judge.time_limit_s = 240.0;
+    // A board on which a decision takes 0.1 s instead of 0.7 s.
+    for (core::StageCost& cost : config_.flight.costs.stage) cost = core::slower(cost, 0.15);
+    for (governor::LatencyModel& model : config_.flight.model) {
+      for (double& fixed_s : model.fixed_s) fixed_s *= 0.15;
+      for (double& slope_s_per_m3 : model.slope_s_per_m3) slope_s_per_m3 *= 0.15;
+    }
+  }
+  /// A D455's field of view, with few pixels: the simulator casts each of them.
+  static CameraSpec front() {
+    CameraSpec camera;
+    camera.width = 160;
+    camera.height = 120;
+    camera.tan_half_width = rig_detail::tan_of_half_deg(87.0);
+    camera.tan_half_height = rig_detail::tan_of_half_deg(58.0);
+    camera.range_min_m = 0.3;
+    camera.range_m = 10.0;
+    camera.rate_Hz = 30.0;
+    camera.mount.x_m = 0.1;
+    camera.mount.z_m = 0.2;  // nearer to the ground it would see little else before the take-off
+    return camera;
+  }
+  report::MissionResult fly(const char* what) {
+    const report::MissionReport report = fly_mission(world_, config_, {});
+    const report::MissionResult& r = report.result;
+    std::printf("%s: %s after %.0f s, %.1f m, mean %.2f m/s, %zu decisions\n", what, r.reason.c_str(),
+                r.mission_time_s, r.distance_m, r.mean_velocity_mps, static_cast<std::size_t>(r.decisions));
+    return r;
+  }
+  sitl::World world_;
+  MissionConfig config_;
+};
+
+TEST_F(RigFlight, OneFrontCameraReachesTheGoal) {
+  config_.simulator.rig.emplace();
+  ASSERT_TRUE(config_.simulator.rig->cameras.push_back(front()));
+  double most_turn_radps = 0.0;
+  config_.each_frame = [&](const FrameRecord& f) {
+    most_turn_radps = std::max(most_turn_radps, std::fabs(f.truth.w_WB_B.z()));
+  };
+  const report::MissionResult r = fly("one front camera");
+  EXPECT_FALSE(r.collided);
+  EXPECT_TRUE(r.reached_goal) << r.reason;
+  EXPECT_GT(most_turn_radps, 0.5) << "it looks round";
+  EXPECT_LT(most_turn_radps, 1.6) << "not faster than it is told";
+}
+
+TEST_F(RigFlight, ARigThatCannotBeIsRefusedByName) {
+  const auto refusal = [&](auto&& change) -> std::string {
+    config_.simulator.rig.emplace();
+    (void)config_.simulator.rig->cameras.push_back(front());
+    change(*config_.simulator.rig);
+    try {
+      (void)fly_mission(world_, config_, {});
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return {};
+  };
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(refusal([](SensorRig& r) {
+              r.cameras[0].range_m = kNaN;
+            }).find("camera 1: range_m: must be from 1 to 200"),
+            std::string::npos);
+  EXPECT_NE(refusal([](SensorRig& r) { r.cameras[0].tan_half_width = 0.0; }).find("horizontal_fov_deg"),
+            std::string::npos);
+  EXPECT_NE(refusal([](SensorRig& r) { r.cameras[0].range_min_m = 11.0; }).find("range_min_m"),
+            std::string::npos);
+  EXPECT_NE(refusal([](SensorRig& r) { (void)r.lidars.push_back({.rings = 0}); }).find("lidar 1: rings"),
+            std::string::npos);
+  EXPECT_NE(refusal([](SensorRig& r) { r.cameras.clear(); }).find("one sensor at least"), std::string::npos);
+}
+
+TEST_F(RigFlight, MemoryFollowsTheLargestImage) {
+  const auto pyramid_bytes = [&] {
+    std::size_t bytes = 0;
+    for (const report::PoolUse& pool : fly_mission(world_, config_, {}).pools)
+      if (std::string(pool.name) == "map depth pyramid") bytes += pool.element_bytes * pool.count;
+    return bytes;
+  };
+  config_.judge.time_limit_s = 1.0;
+  config_.simulator.rig.emplace();
+  (void)config_.simulator.rig->cameras.push_back(front());
+  const std::size_t small = pyramid_bytes();
+  EXPECT_NEAR(static_cast<double>(small), 160 * 120 * 7.0 / 3.0 * 4.0, 2e3);
+  config_.simulator.rig->cameras[0].width = 320;
+  EXPECT_NEAR(static_cast<double>(pyramid_bytes()), 2.0 * static_cast<double>(small), 4e3);
+}
+
+TEST_F(RigFlight, OneLidarReachesTheGoal) {
+  config_.simulator.rig.emplace();
+  LidarSpec lidar;
+  lidar.rings = 32;
+  lidar.columns = 360;
+  lidar.lowest_deg = -45.0;
+  lidar.highest_deg = 45.0;
+  lidar.range_m = 25.0;
+  ASSERT_TRUE(config_.simulator.rig->lidars.push_back(lidar));
+  const report::MissionResult r = fly("one LiDAR");
+  EXPECT_FALSE(r.collided);
+  EXPECT_TRUE(r.reached_goal) << r.reason;
+}
+
+}  // namespace
+}  // namespace roborun::mission
