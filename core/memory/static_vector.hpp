@@ -11,6 +11,8 @@ namespace roborun::core {
 template <typename T, std::size_t N>
 class StaticVector {
  public:
+  using value_type = T;
+
   [[nodiscard]] bool push_back(const T& value) noexcept {
     if (size_ == N) return false;
     items_[size_++] = value;

@@ -12,6 +12,7 @@
 #include "platform/app/audit_command.hpp"
 #include "platform/app/calibrate_command.hpp"
 #include "platform/app/can_command.hpp"
+#include "platform/app/config_command.hpp"
 #include "platform/app/explain_command.hpp"
 #include "platform/app/fly_command.hpp"
 #include "platform/app/gpio_command.hpp"
@@ -60,6 +61,7 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   roborun::app::add_scenario_command(app, run);
   roborun::app::add_replay_command(app, run);
   roborun::app::add_vehicle_command(app, run);
+  roborun::app::add_config_command(app, run);
   try {
     app.parse(argc, argv);
     return run ? run() : 2;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "platform/input/input_error.hpp"
+#include "platform/sitl/sensors/lidar.hpp"
 
 namespace roborun::mission {
 
@@ -22,6 +23,9 @@ flight::FlightConfig flight_config_of(const sitl::World& world, const MissionCon
   flight.goal_W = world.goal_W();
   flight.cruise_m = world.start_W().z();
   const SensorRig rig = sitl::rig_of(config.simulator);
+  if (const VehicleKey* key = out_of_bounds(flight.vehicle))
+    throw InputError(fmt::format("vehicle: {}.{}: {} must be from {} to {}", key->table, key->key,
+                                 flight.vehicle.*key->value, key->low, key->high));
   if (const auto fault = first_fault(rig))
     throw InputError(fmt::format("{} {}: {}: must be from {} to {}: {}", fault->sensor, fault->index + 1,
                                  fault->key, fault->low, fault->high, fault->text));
@@ -32,6 +36,14 @@ flight::FlightConfig flight_config_of(const sitl::World& world, const MissionCon
 
 void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle) {
   config.flight.vehicle = vehicle.model;
+  config.simulator.rig = vehicle.rig;
+  config.simulator.lidar_patterns.clear();
+  for (std::size_t i = 0; i < vehicle.rig.lidars.size(); ++i) {
+    auto& pattern = config.simulator.lidar_patterns.emplace_back();
+    if (i >= vehicle.patterns.size() || vehicle.patterns[i].empty()) continue;
+    pattern = sitl::load_lidar_pattern(vehicle.patterns[i]);
+    config.simulator.rig->lidars[i] = sitl::spec_of(pattern, vehicle.rig.lidars[i]);
+  }
 }
 
 Vector3 ground_below(const sitl::World& world) { return {world.start_W().x(), world.start_W().y(), 0.0}; }

@@ -1,6 +1,9 @@
 #include "platform/mission/settings_file.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
 #include <vector>
 
 #include "platform/input/text_file.hpp"
@@ -9,20 +12,88 @@
 namespace roborun::mission {
 namespace {
 
-struct Range {
-  double low;
-  double high;
+/// What [camera] says goes for all cameras of the rig, too.
+template <typename Set>
+void set_cameras(MissionConfig& config, Set&& set) {
+  if (!config.simulator.rig) return;
+  for (CameraSpec& camera : config.simulator.rig->cameras) set(camera);
+}
+
+void limit_range(MissionConfig& config, double range_m) {
+  double& camera_m = config.simulator.camera.range_m;
+  camera_m = std::min(camera_m, range_m);
+  if (!config.simulator.rig) return;
+  for (CameraSpec& c : config.simulator.rig->cameras) c.range_m = std::min(c.range_m, range_m);
+  for (LidarSpec& l : config.simulator.rig->lidars) l.range_m = std::min(l.range_m, range_m);
+}
+
+/// One number of a settings file.
+struct SettingKey {
+  const char* table;
+  const char* key;
+  double (*get)(const MissionConfig&);
+  void (*set)(MissionConfig&, double);
+  double low, high;  ///< Both allowed.
+  bool whole;
+  const char* text;
 };
 
-/// A number within [low, high] into `value`, if the key is there.
-void read(const input::TomlReader& reader, const toml::table& table, const char* key, Range range,
-          double& value) {
-  const toml::node* node = table.get(key);
-  if (node == nullptr) return;
-  const auto raw = node->is_integer() || node->is_floating_point() ? node->value<double>() : std::nullopt;
-  if (!raw || !(*raw >= range.low && *raw <= range.high))
-    reader.refuse(*node, key, fmt::format("must be a number from {} to {}", range.low, range.high));
-  value = *raw;
+// clang-format off
+constexpr std::array<SettingKey, 15> kSettings = [] {
+  using C = MissionConfig;
+  return std::array<SettingKey, 15>{{
+    {"camera", "pixels", [](const C& c) { return static_cast<double>(c.simulator.camera.pixels); },
+     [](C& c, double v) { c.simulator.camera.pixels = static_cast<std::uint16_t>(v);
+                          set_cameras(c, [v](CameraSpec& s) { s.width = s.height = static_cast<std::uint16_t>(v); }); },
+     8, 1280, true, "a side of each image, a whole number"},
+    {"camera", "range_m", [](const C& c) { return c.simulator.camera.range_m; },
+     [](C& c, double v) { c.simulator.camera.range_m = v; set_cameras(c, [v](CameraSpec& s) { s.range_m = v; }); },
+     5, 100, false, "depth beyond which a camera sees nothing"},
+    {"camera", "rate_Hz", [](const C& c) { return c.simulator.camera.rate_Hz; },
+     [](C& c, double v) { c.simulator.camera.rate_Hz = v; set_cameras(c, [v](CameraSpec& s) { s.rate_Hz = v; }); },
+     1, 100, false, "images per second"},
+    {"camera", "latency_s", [](const C& c) { return c.simulator.camera.latency_s; },
+     [](C& c, double v) { c.simulator.camera.latency_s = v; set_cameras(c, [v](CameraSpec& s) { s.latency_s = v; }); },
+     0, 0.4, false, "from exposure to the depth image"},
+    {"camera", "noise_m", [](const C& c) { return c.simulator.camera.noise_m; },
+     [](C& c, double v) { c.simulator.camera.noise_m = v; }, 0, 1, false, "one sigma at zero depth"},
+    {"camera", "noise_per_m", [](const C& c) { return c.simulator.camera.noise_per_m; },
+     [](C& c, double v) { c.simulator.camera.noise_per_m = v; }, 0, 0.1, false, "one sigma besides, times depth squared"},
+    {"camera", "pixel_dropout_ratio", [](const C& c) { return c.simulator.camera.pixel_dropout_ratio; },
+     [](C& c, double v) { c.simulator.camera.pixel_dropout_ratio = v; }, 0, 1, false, "pixels that say nothing"},
+    {"camera", "frame_dropout_ratio", [](const C& c) { return c.simulator.camera.frame_dropout_ratio; },
+     [](C& c, double v) { c.simulator.camera.frame_dropout_ratio = v; }, 0, 1, false, "images that never arrive"},
+    {"wind", "gust_mps", [](const C& c) { return c.simulator.wind.gust_mps; },
+     [](C& c, double v) { c.simulator.wind.gust_mps = v; }, 0, 10, false, "one sigma of the gusts along each axis, half of it upwards"},
+    {"battery", "capacity_J", [](const C& c) { return c.flight.vehicle.battery_J; },
+     [](C& c, double v) { c.flight.vehicle.battery_J = v; }, 1e3, 1e9, false, "usable energy of a full battery"},
+    {"flight", "v_max_mps", [](const C& c) { return c.flight.vehicle.speed_mps; },
+     [](C& c, double v) { c.flight.vehicle.speed_mps = v; }, 0.5, 30, false, "fastest flight of the design aware"},
+    {"flight", "time_limit_s", [](const C& c) { return c.judge.time_limit_s; },
+     [](C& c, double v) { c.judge.time_limit_s = v; }, 1, 100000, false, "after which a mission is given up"},
+    {"cpu", "slow_down_at_s", [](const C& c) { return c.slow_down.at_s; },
+     [](C& c, double v) { c.slow_down.at_s = v; }, 0, 100000, false, "from then on the processor is throttled"},
+    {"cpu", "slow_down_factor", [](const C& c) { return c.slow_down.factor; },
+     [](C& c, double v) { c.slow_down.factor = v; }, 0.1, 100, false, "times as long as before"},
+    {"fog", "visibility_m", [](const C& c) { return c.simulator.camera.range_m; }, limit_range,
+     5, 100, false, "no sensor sees farther"},
+  }};
+}();
+// clang-format on
+
+/// Keys that are no single number.
+constexpr std::array<std::pair<const char*, const char*>, 4> kOtherKeys{
+    {{"wind", "mean_mps"}, {"fence", "altitude_m"}, {"fence", "keep_in"}, {"fence", "keep_out"}}};
+
+std::set<std::string_view> keys_of(std::string_view table) {
+  std::set<std::string_view> keys;
+  for (const SettingKey& key : kSettings) {
+    if (table == key.table) keys.insert(key.key);
+  }
+  for (const auto& [of, key] : kOtherKeys) {
+    if (table == of) keys.insert(key);
+  }
+  return keys;
 }
 
 const toml::table* section(const input::TomlReader& reader, const toml::table& root, const char* name,
@@ -78,21 +149,6 @@ void read_areas(const input::TomlReader& reader, const toml::table& table, const
   }
 }
 
-/// What [camera] says goes for all cameras of the rig.
-void apply(const toml::table& said, const sitl::DepthCameraConfig& camera, SensorRig& rig) {
-  for (CameraSpec& c : rig.cameras) {
-    if (said.contains("pixels")) c.width = c.height = camera.pixels;
-    if (said.contains("range_m")) c.range_m = camera.range_m;
-    if (said.contains("rate_Hz")) c.rate_Hz = camera.rate_Hz;
-    if (said.contains("latency_s")) c.latency_s = camera.latency_s;
-  }
-}
-
-void limit_range(double range_m, SensorRig& rig) {
-  for (CameraSpec& c : rig.cameras) c.range_m = std::min(c.range_m, range_m);
-  for (LidarSpec& l : rig.lidars) l.range_m = std::min(l.range_m, range_m);
-}
-
 }  // namespace
 
 void load_settings(const std::string& path, MissionConfig& config) {
@@ -103,47 +159,22 @@ void load_settings(const std::string& path, MissionConfig& config) {
 }
 
 void read_settings(const input::TomlReader& reader, const toml::table& root, MissionConfig& config) {
-  if (const toml::table* t = section(reader, root, "camera",
-                                     {"pixels", "range_m", "rate_Hz", "latency_s", "noise_m", "noise_per_m",
-                                      "pixel_dropout_ratio", "frame_dropout_ratio"})) {
-    sitl::DepthCameraConfig& c = config.simulator.camera;
-    double pixels = c.pixels;
-    read(reader, *t, "pixels", {8, 1280}, pixels);
-    c.pixels = static_cast<std::uint16_t>(pixels);
-    read(reader, *t, "range_m", {5, 100}, c.range_m);
-    read(reader, *t, "rate_Hz", {1, 100}, c.rate_Hz);
-    read(reader, *t, "latency_s", {0, 0.4}, c.latency_s);
-    read(reader, *t, "noise_m", {0, 1}, c.noise_m);
-    read(reader, *t, "noise_per_m", {0, 0.1}, c.noise_per_m);
-    read(reader, *t, "pixel_dropout_ratio", {0, 1}, c.pixel_dropout_ratio);
-    read(reader, *t, "frame_dropout_ratio", {0, 1}, c.frame_dropout_ratio);
-    if (config.simulator.rig) apply(*t, c, *config.simulator.rig);
+  for (const SettingKey& key : kSettings) {
+    const toml::table* table = section(reader, root, key.table, keys_of(key.table));
+    const toml::node* node = table == nullptr ? nullptr : table->get(key.key);
+    if (node == nullptr) continue;
+    const double value = reader.number(*node, key.key, key.low, key.high);
+    if (key.whole && value != std::floor(value)) reader.refuse(*node, key.key, "must be a whole number");
+    key.set(config, value);
   }
-  if (const toml::table* t = section(reader, root, "wind", {"mean_mps", "gust_mps"})) {
+  if (const toml::table* t = section(reader, root, "wind", keys_of("wind"))) {
     if (const toml::node* mean = t->get("mean_mps")) {
       config.simulator.wind.mean_W_mps = reader.point(*mean, "mean_mps");
       if (config.simulator.wind.mean_W_mps.norm() > 20.0)
         reader.refuse(*mean, "mean_mps", "must be at most 20 m/s");
     }
-    read(reader, *t, "gust_mps", {0, 10}, config.simulator.wind.gust_mps);
   }
-  if (const toml::table* t = section(reader, root, "battery", {"capacity_J"}))
-    read(reader, *t, "capacity_J", {1e3, 1e9}, config.flight.vehicle.battery_J);
-  if (const toml::table* t = section(reader, root, "flight", {"v_max_mps", "time_limit_s"})) {
-    read(reader, *t, "v_max_mps", {0.5, 12}, config.flight.vehicle.speed_mps);
-    read(reader, *t, "time_limit_s", {1, 100000}, config.judge.time_limit_s);
-  }
-  if (const toml::table* t = section(reader, root, "cpu", {"slow_down_at_s", "slow_down_factor"})) {
-    read(reader, *t, "slow_down_at_s", {0, 100000}, config.slow_down.at_s);
-    read(reader, *t, "slow_down_factor", {0.1, 100}, config.slow_down.factor);
-  }
-  if (const toml::table* t = section(reader, root, "fog", {"visibility_m"})) {
-    double visibility_m = config.simulator.camera.range_m;
-    read(reader, *t, "visibility_m", {5, 100}, visibility_m);
-    config.simulator.camera.range_m = std::min(config.simulator.camera.range_m, visibility_m);
-    if (config.simulator.rig) limit_range(visibility_m, *config.simulator.rig);
-  }
-  if (const toml::table* t = section(reader, root, "fence", {"altitude_m", "keep_in", "keep_out"})) {
+  if (const toml::table* t = section(reader, root, "fence", keys_of("fence"))) {
     if (const toml::node* node = t->get("altitude_m")) {
       const auto v = numbers(reader, *node, "altitude_m", 2, "[lowest, highest]");
       check(reader, *node, "altitude_m", config.flight.fence.set_altitude(v[0], v[1]));
@@ -151,6 +182,14 @@ void read_settings(const input::TomlReader& reader, const toml::table& root, Mis
     read_areas(reader, *t, "keep_in", core::FenceSide::kKeepIn, config.flight.fence);
     read_areas(reader, *t, "keep_out", core::FenceSide::kKeepOut, config.flight.fence);
   }
+}
+
+std::vector<input::KeyText> settings_keys() {
+  std::vector<input::KeyText> keys;
+  const MissionConfig defaults;
+  for (const SettingKey& key : kSettings)
+    keys.push_back({key.table, key.key, key.low, key.high, key.get(defaults), key.text});
+  return keys;
 }
 
 }  // namespace roborun::mission

@@ -4,16 +4,15 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "platform/input/key_text.hpp"
 #include "platform/input/toml_reader.hpp"
 #include "platform/mission/mission.hpp"
 
 namespace roborun::mission {
 
-/// Tables [camera] pixels, range_m, rate_Hz, latency_s, noise_m, noise_per_m, pixel_dropout_ratio,
-/// frame_dropout_ratio; [wind] mean_mps = [x, y, z], gust_mps; [battery] capacity_J; [flight] v_max_mps,
-/// time_limit_s; [cpu] slow_down_at_s, slow_down_factor; [fog] visibility_m; [fence] altitude_m = [low,
-/// high], keep_in and keep_out, arrays of { polygon = [[x, y], ...] } or { circle = [x, y, radius] }. What is
+/// The numbers of settings_keys(); [wind] mean_mps = [x, y, z]; [fence] altitude_m = [low, high], keep_in and keep_out, arrays of { polygon = [[x, y], ...] } or { circle = [x, y, radius] }. What is
 /// not there keeps its default. Throws InputError with file, line, key and range.
 void load_settings(const std::string& path, MissionConfig& config);
 
@@ -21,5 +20,7 @@ void load_settings(const std::string& path, MissionConfig& config);
 inline const std::set<std::string_view> kSettingsTables{"camera", "wind", "battery", "flight",
                                                         "cpu",    "fog",  "fence"};
 void read_settings(const input::TomlReader& reader, const toml::table& root, MissionConfig& config);
+/// Every number of a settings file.
+[[nodiscard]] std::vector<input::KeyText> settings_keys();
 
 }  // namespace roborun::mission

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <filesystem>
 #include <set>
 #include <string_view>
 
@@ -19,8 +21,12 @@ namespace {
 
 constexpr std::array<const char*, 3> kStoppingKeys{"quadratic_s2pm", "linear_s", "constant_m"};
 
+bool is_whole(std::string_view key) {
+  return key == "width" || key == "height" || key == "rings" || key == "columns";
+}
+
 std::set<std::string_view> tables() {
-  std::set<std::string_view> names{"vehicle", "stopping"};
+  std::set<std::string_view> names{"vehicle", "stopping", "camera", "lidar"};
   for (const VehicleKey& key : kVehicleKeys) names.insert(key.table);
   return names;
 }
@@ -36,6 +42,10 @@ class VehicleReader {
     read_head(vehicle);
     read_model(vehicle.model);
     vehicle.model.measured_stopping = measured_stopping();
+    read_sensors("camera", vehicle.rig.cameras, nullptr);
+    read_sensors("lidar", vehicle.rig.lidars, &vehicle.patterns);
+    if (vehicle.rig.cameras.empty() && vehicle.rig.lidars.empty())
+      reader_.refuse(root_, "camera", "missing: must have at least one [[camera]] or [[lidar]]");
     return vehicle;
   }
 
@@ -70,6 +80,46 @@ class VehicleReader {
       reader_.allow_keys(table(name), fmt::format("[{}]", name), known);
     }
   }
+  template <typename Sensors>
+  void read_sensors(const char* name, Sensors& sensors, std::vector<std::string>* patterns) const {
+    const toml::node* list = root_.get(name);
+    if (list == nullptr) return;
+    if (list->as_array() == nullptr)
+      reader_.refuse(*list, name, fmt::format("must be written as [[{}]]", name));
+    for (const toml::node& node : *list->as_array()) {
+      const toml::table* from = node.as_table();
+      if (from == nullptr) reader_.refuse(node, name, fmt::format("must be written as [[{}]]", name));
+      auto sensor = typename Sensors::value_type{};
+      read_sensor(fmt::format("[[{}]]", name), *from, sensor);
+      if (!sensors.push_back(sensor))
+        reader_.refuse(node, name, fmt::format("must be at most {}", Sensors::capacity()));
+      if (patterns != nullptr) patterns->push_back(pattern_of(*from));
+    }
+  }
+  /// Relative to this file.
+  std::string pattern_of(const toml::table& lidar) const {
+    const toml::node* node = lidar.get("pattern");
+    if (node == nullptr) return {};
+    const auto name = node->value<std::string>();
+    if (!name || name->empty()) reader_.refuse(*node, "pattern", "must be the path of a file");
+    return (std::filesystem::path(path_).parent_path() / *name).string();
+  }
+  template <typename Spec>
+  void read_sensor(const std::string& where, const toml::table& from, Spec& sensor) const {
+    std::set<std::string_view> known;
+    for (const SensorKey<Spec>& key : keys_of(sensor)) {
+      known.insert(key.key);
+      const toml::node& node = reader_.need(from, key.key, where);
+      const double value = reader_.number(node, key.key, key.low, key.high);
+      if (is_whole(key.key) && value != std::floor(value))
+        reader_.refuse(node, key.key, "must be a whole number");
+      (void)assign(key, sensor, value);
+    }
+    if (where == "[[lidar]]") known.insert("pattern");
+    reader_.allow_keys(from, where, known);
+    if (!(sensor.range_m > sensor.range_min_m))
+      reader_.refuse(*from.get("range_m"), "range_m", "must be more than range_min_m");
+  }
   std::optional<StoppingModel> measured_stopping() const {
     if (root_.get("stopping") == nullptr) return std::nullopt;
     const toml::table& from = table("stopping");
@@ -93,7 +143,16 @@ Vehicle vehicle_from_toml(const std::string& path, const std::string& text) {
   core::StateHash hash;
   for (const char c : text) hash.add(static_cast<std::uint64_t>(static_cast<unsigned char>(c)));
   vehicle.digest = fmt::format("{:016x}", hash.value());
-  if (const char* why = cannot_fly(vehicle.model, 25.0)) throw InputError(fmt::format("{}: {}", path, why));
+  if (const char* why = cannot_fly(vehicle.model, shortest_range_m(vehicle.rig)))
+    throw InputError(fmt::format("{}: {}", path, why));
+  if (const auto fault = first_fault(vehicle.rig))
+    throw InputError(fmt::format("{}: {} {}: {}: must be from {} to {}: {}", path, fault->sensor,
+                                 fault->index + 1, fault->key, fault->low, fault->high, fault->text));
+  if (!looks_forward(vehicle.rig))
+    throw InputError(
+        fmt::format("{}: cannot see where it flies: a camera or LiDAR must look within 45 degrees of "
+                    "forward (yaw_deg, pitch_deg)",
+                    path));
   return vehicle;
 }
 
@@ -117,6 +176,12 @@ std::vector<input::KeyText> vehicle_keys() {
   const VehicleModel defaults;
   for (const VehicleKey& key : kVehicleKeys)
     keys.push_back({key.table, key.key, key.low, key.high, defaults.*key.value, key.text});
+  const auto add = [&keys](const char* table, const auto& sensor) {
+    for (const auto& key : keys_of(sensor))
+      keys.push_back({table, key.key, key.low, key.high, key.get(sensor), key.text});
+  };
+  add("[camera]", CameraSpec{});
+  add("[lidar]", LidarSpec{});
   return keys;
 }
 

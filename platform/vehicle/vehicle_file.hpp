@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/sensor_rig.hpp"
 #include "core/vehicle_model.hpp"
 #include "platform/input/key_text.hpp"
 
@@ -14,18 +15,22 @@ struct Vehicle {
   std::string about;   ///< One line.
   std::string digest;  ///< Of the file's text, 16 hexadecimal digits.
   VehicleModel model{};
+  SensorRig rig{};
+  /// By LiDAR of the rig: path of the file with its directions, or empty: rings.
+  std::vector<std::string> patterns{};
 };
 
 /// Tables [vehicle] name, about; [body], [propulsion], [drag], [power], [limits] with every key of
 /// kVehicleKeys: nothing about a vehicle is assumed; [stopping] (quadratic_s2pm, linear_s, constant_m) where
-/// it has been measured. Throws InputError with file, line, key and what would be right, also for a vehicle
+/// it has been measured; one [[camera]] or [[lidar]] per sensor, with every key of kCameraKeys or kLidarKeys
+/// (and `pattern = FILE`: a line "azimuth_deg elevation_deg" per direction, instead of rings). Throws InputError with file, line, key and what would be right, also for a vehicle
 /// that cannot fly.
 [[nodiscard]] Vehicle vehicle_from_toml(const std::string& path, const std::string& text);
 /// A shipped vehicle by its name, or one of a file. Throws InputError.
 [[nodiscard]] Vehicle load_vehicle(const std::string& name_or_path);
 /// Names of the shipped vehicles, `paper` first.
 [[nodiscard]] std::vector<std::string> shipped_vehicles();
-/// Every key of a vehicle file.
+/// Every key of a vehicle file; a sensor's in the tables "[camera]" and "[lidar]".
 [[nodiscard]] std::vector<input::KeyText> vehicle_keys();
 
 }  // namespace roborun::vehicle

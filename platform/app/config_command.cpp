@@ -1,0 +1,65 @@
+#include "platform/app/config_command.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "platform/input/key_text.hpp"
+#include "platform/mission/settings_file.hpp"
+#include "platform/vehicle/vehicle_file.hpp"
+
+namespace roborun::app {
+namespace {
+
+nlohmann::ordered_json json_of(const std::vector<input::KeyText>& keys) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const input::KeyText& k : keys)
+    list.push_back({{"table", k.table},
+                    {"key", k.key},
+                    {"unit", input::unit_of(k.key)},
+                    {"low", k.low},
+                    {"high", k.high},
+                    {"default", k.value},
+                    {"text", k.text}});
+  return list;
+}
+
+int config(bool json) {
+  const auto settings = mission::settings_keys();
+  const auto vehicle = vehicle::vehicle_keys();
+  if (json) {
+    nlohmann::ordered_json j = {{"settings", json_of(settings)}, {"vehicle", json_of(vehicle)}};
+    fmt::print("{}\n", j.dump());
+    return 0;
+  }
+  fmt::print(
+      "# Settings of a simulated mission: --settings FILE. Every key may be left out.\n"
+      "# key, unit, range, default, meaning\n\n{}\n"
+      "Besides: [wind] mean_mps = [x, y, z], at most 20 m/s (default 1.5, 1, 0); [fence] altitude_m = [low, "
+      "high],\n"
+      "keep_in and keep_out = [{{ polygon = [[x, y], ...] }}, {{ circle = [x, y, radius] }}].\n\n",
+      input::reference_of(settings));
+  fmt::print(
+      "# Vehicles: --vehicle FILE. No key may be left out; the numbers shown as defaults are those of "
+      "`paper`,\n"
+      "# and of a camera and a LiDAR that are not its own. One [[camera]] or [[lidar]] per sensor.\n\n{}\n"
+      "Besides: [vehicle] name, about; [stopping] quadratic_s2pm, linear_s, constant_m, where the stop was "
+      "measured;\n"
+      "[[lidar]] pattern = FILE, a line \"azimuth_deg elevation_deg\" per direction.\n",
+      input::reference_of(vehicle));
+  return 0;
+}
+
+}  // namespace
+
+void add_config_command(CLI::App& app, std::function<int()>& run) {
+  const auto json = std::make_shared<bool>(false);
+  CLI::App* command = app.add_subcommand(
+      "config", "Every key of settings and vehicle files, with unit, range, default and meaning");
+  command->footer("Examples:\n  roborun config\n  roborun config --json\n\nExit code: 0.");
+  command->add_flag("--json", *json, "One JSON object on standard output, nothing else");
+  command->callback([json, &run] { run = [json] { return config(*json); }; });
+}
+
+}  // namespace roborun::app
