@@ -32,6 +32,7 @@ flight::FlightConfig flight_config_of(const sitl::World& world, const MissionCon
 
 void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle) {
   config.flight.vehicle = vehicle.model;
+  config.simulator.rig = vehicle.rig;
 }
 
 Vector3 ground_below(const sitl::World& world) { return {world.start_W().x(), world.start_W().y(), 0.0}; }

@@ -12,6 +12,7 @@
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/input/toml_reader.hpp"
+#include "platform/vehicle/rig_tables.hpp"
 #include "platform/vehicle/shipped_vehicles.hpp"
 
 namespace roborun::vehicle {
@@ -20,7 +21,7 @@ namespace {
 constexpr std::array<const char*, 3> kStoppingKeys{"quadratic_s2pm", "linear_s", "constant_m"};
 
 std::set<std::string_view> tables() {
-  std::set<std::string_view> names{"vehicle", "stopping"};
+  std::set<std::string_view> names{"vehicle", "stopping", "camera", "lidar"};
   for (const VehicleKey& key : kVehicleKeys) names.insert(key.table);
   return names;
 }
@@ -36,6 +37,7 @@ class VehicleReader {
     read_head(vehicle);
     read_model(vehicle.model);
     vehicle.model.measured_stopping = measured_stopping();
+    vehicle.rig = read_rig(reader_, root_);
     return vehicle;
   }
 
@@ -93,7 +95,12 @@ Vehicle vehicle_from_toml(const std::string& path, const std::string& text) {
   core::StateHash hash;
   for (const char c : text) hash.add(static_cast<std::uint64_t>(static_cast<unsigned char>(c)));
   vehicle.digest = fmt::format("{:016x}", hash.value());
-  if (const char* why = cannot_fly(vehicle.model, 25.0)) throw InputError(fmt::format("{}: {}", path, why));
+  const double visible_m = vehicle.rig ? shortest_range_m(*vehicle.rig) : 25.0;
+  if (vehicle.rig && !looks_forward(*vehicle.rig))
+    throw InputError(fmt::format(
+        "{}: yaw_deg: nothing looks within 45 degrees of forward: it must see where it flies", path));
+  if (const char* why = cannot_fly(vehicle.model, visible_m))
+    throw InputError(fmt::format("{}: {}", path, why));
   return vehicle;
 }
 
