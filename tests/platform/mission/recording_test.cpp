@@ -14,6 +14,7 @@
 #include "platform/mission/replay.hpp"
 #include "platform/sitl/aircraft/camera_rig.hpp"
 #include "platform/sitl/world/world_file.hpp"
+#include "platform/vehicle/vehicle_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace roborun::mission {
@@ -124,6 +125,13 @@ TEST_F(Replay, HoldsDifferentCamerasAndALidar) {
   config_.record.clear();
   EXPECT_EQ(fly_mission(world_, config_, {}).result.state_hash, recorded_.state_hash)
       << "recording changed the flight";
+}
+
+TEST_F(Replay, HoldsAVehicleWhoseStoppingNobodyMeasured) {
+  set_vehicle(config_, vehicle::load_vehicle("x500"));
+  ASSERT_FALSE(config_.flight.vehicle.measured_stopping.has_value()) << "else nothing is tested";
+  const ReplayResult r = replay_flight(record(), {});
+  EXPECT_TRUE(r.same()) << "frame " << r.diverged_in << " of " << r.recorded.minor_frames;
 }
 
 TEST_F(Replay, AnswersToFaultsAndKeepsTheFenceAsTheRecordedFlightDid) {
