@@ -11,7 +11,7 @@
 #include "core/vehicle_model.hpp"
 #include "governor/budget/time_budget.hpp"
 #include "governor/models/latency_model.hpp"
-#include "governor/solver/lattice_solver.hpp"
+#include "governor/policy/decision_policy.hpp"
 
 namespace roborun::governor {
 
@@ -22,10 +22,6 @@ enum class Design : std::uint8_t {
   kStaticFair,  ///< The same knobs; its speed comes from the same safety formula as the aware design's.
 };
 [[nodiscard]] const char* to_string(Design design) noexcept;
-
-/// What set the time budget.
-enum class BudgetSource : std::uint8_t { kTrajectory, kVisibility, kShortest, kLongest, kFailures, kFixed };
-[[nodiscard]] const char* to_string(BudgetSource source) noexcept;
 
 /// The extra rules beyond Eq. 3: one field per rule.
 struct Policy {
@@ -76,39 +72,18 @@ struct GovernorConfig {
   [[nodiscard]] Status validate() const noexcept;
 };
 
-struct Situation {
-  int failures{};  ///< Decisions in a row without a trajectory.
-  double distance_to_goal_m{};
-  bool surveying{};  ///< The flight goes on to its hover whatever comes of this decision.
-  bool motion{};     ///< Something moves nearby.
-  bool straight{};   ///< The plan before goes straight towards the goal, for most of what can be seen.
-};
-
-/// What was decided, and why.
-struct Decision {
-  OperatingPoint point{};
-  Nanos time_budget{};  ///< Before the policy.
-  BudgetSource source{};
-  SolverProblem problem{};
-  SolverSolution solution{};
-  core::StageArray<double> predicted_s{};
-  double demand_m{};  ///< Coarsest cell that the space allows: min((g_avg - width) / 4, d_obs / 2).
-  bool open{};        ///< Nothing stands ahead: the straight way, as far as it is free, is the plan.
-};
-
-/// One instance per vehicle. RT-safe: O(1), no allocation.
-class Governor {
+/// The policy that ships. One instance per vehicle. RT-safe: O(1), no allocation.
+class Governor final : public DecisionPolicy {
  public:
   /// Precondition, asserted: config.validate() is kOk.
   explicit Governor(const GovernorConfig& config) noexcept;
 
-  [[nodiscard]] Decision decide(const SpaceProfile& profile, const Situation& situation) noexcept;
-  /// What a stage really took, so that the model follows a machine that slows down.
-  void observe(core::StageId id, double predicted_s, double spent_s) noexcept;
+  [[nodiscard]] Decision decide(const SpaceProfile& profile, const Situation& situation) noexcept override;
+  void observe(core::StageId id, double predicted_s, double spent_s) noexcept override;
   /// Largest v with (visible - d_stop(v)) / (decisions_per_budget * v) >= latency; 0 if none. Closed form.
   [[nodiscard]] double safe_speed_mps(double visible_m, double latency_s) const noexcept;
   /// Speed limit of the static designs; the aware design's upper bound.
-  [[nodiscard]] double v_max_mps() const noexcept { return v_max_mps_; }
+  [[nodiscard]] double v_max_mps() const noexcept override { return v_max_mps_; }
 
  private:
   struct Task;

@@ -166,8 +166,11 @@ void add_calibrate_command(CLI::App& app, std::function<int()>& run) {
       "  roborun calibrate --stopping                           braking distance of the simulated vehicle");
   command->add_option("--out", options->out, "Write the board profile to this TOML file");
   command->add_option("--plot", options->plot, "Draw points and models into this SVG file");
-  command->add_option("--map", options->backends.map, "own or octomap")->capture_default_str();
-  command->add_option("--planner", options->backends.planner, "own, or ompl:NAME such as ompl:RRTstar")
+  command->add_option("--map", options->backends.map, "own, octomap, or plugin:FILE.so")
+      ->capture_default_str();
+  command
+      ->add_option("--planner", options->backends.planner,
+                   "own, ompl:NAME such as ompl:RRTstar, or plugin:FILE.so")
       ->capture_default_str();
   command->add_option("--repeats", options->repeats, "Passes over the sweep; a point gets 4 samples in each")
       ->check(CLI::Range(1, 1000))

@@ -209,10 +209,11 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
                       "With --profile host: where the measured costs are kept [~/.cache/roborun/]");
   fly_app->add_option("--seed", options->seed, "Seed of world, noise, wind and planner")
       ->capture_default_str();
-  fly_app->add_option("--map", options->map, "own or octomap")->capture_default_str();
+  fly_app->add_option("--map", options->map, "own, octomap, or plugin:FILE.so")->capture_default_str();
   fly_app
       ->add_option("--planner", options->planner,
-                   "own, or ompl:NAME with any of OMPL's geometric planners, such as ompl:RRTstar")
+                   "own, ompl:NAME with any of OMPL's geometric planners, such as ompl:RRTstar, or "
+                   "plugin:FILE.so (see platform/board/plugin.hpp)")
       ->capture_default_str();
   fly_app->add_option("--world", options->world, "World from a file instead: .toml, or OctoMap .bt / .ot");
   fly_app->add_option("--start", options->start, "With --world: X,Y,Z in metres");

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "core/record/state_hash.hpp"
+#include "platform/board/backends.hpp"
 #include "platform/evaluation/sweep_run.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
@@ -97,6 +98,9 @@ evaluation::SweepPlan plan_of(const SweepOptions& options, evaluation::SweepInpu
   set_shard(options.shard, plan);
   plan.map = options.map;
   plan.planner = options.planner;
+  if (board::uses_plugin({plan.map, plan.planner}))
+    throw InputError(
+        "--map, --planner: a sweep goes on later, when a plugin may be another: must be those that ship");
   const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.vehicle);
   mission::set_vehicle(inputs.base, vehicle);
   plan.vehicle = fmt::format("{} {}", vehicle.name, vehicle.digest);

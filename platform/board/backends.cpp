@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "platform/board/plugin_loader.hpp"
 #include "platform/input/input_error.hpp"
 #include "stages/perception/brick_map.hpp"
 #include "stages/perception/cloud_images.hpp"
@@ -28,22 +29,27 @@ stages::BrickMap::Config brick_config(const Aabb& map_bounds_W, const ImageLimit
   return config;
 }
 
-std::unique_ptr<stages::OccupancyMap> make_map(const std::string& name, const Aabb& bounds_W,
-                                               const ImageLimits& images, core::Arena& arena) {
+std::unique_ptr<stages::OccupancyMap> make_map(const std::string& name, const PartRequest& request,
+                                               core::Arena& arena) {
+  const auto& [bounds_W, images] = request;
   if (name == "own") return std::make_unique<stages::BrickMap>(brick_config(bounds_W, images), arena);
   if (name == "octomap")
     return stages::make_octomap_backend({bounds_W, images.vehicle_radius_m, images.range_m + 5.0});
-  throw InputError(fmt::format("unknown map '{}': must be own or octomap", name));
+  if (is_plugin(name)) return load_map(name, request);
+  throw InputError(fmt::format("unknown map '{}': must be own or octomap, or plugin:FILE.so", name));
 }
 
-std::unique_ptr<stages::Planner> make_planner(const std::string& name, core::Arena& arena) {
+std::unique_ptr<stages::Planner> make_planner(const std::string& name, const PartRequest& request,
+                                              core::Arena& arena) {
   if (name == "own") return std::make_unique<stages::RrtStar>(stages::RrtStar::Config{}, arena);
+  if (is_plugin(name)) return load_planner(name, request);
   std::unique_ptr<stages::Planner> planner;
   if (name.rfind("ompl:", 0) == 0) planner = stages::make_ompl_planner(name.substr(5), {});
   if (planner == nullptr) {
     throw InputError(fmt::format(
-        "unknown planner '{}': must be own or ompl:NAME, NAME one of OMPL's geometric planners (RRTstar, "
-        "InformedRRTstar, BITstar, ABITstar, AITstar, RRTConnect, PRMstar, FMT, ...)",
+        "unknown planner '{}': must be own or ompl:NAME, NAME one of OMPL's "
+        "geometric planners (RRTstar, "
+        "InformedRRTstar, BITstar, ABITstar, AITstar, RRTConnect, PRMstar, FMT, ...), or plugin:FILE.so",
         name));
   }
   return planner;
@@ -70,15 +76,21 @@ ImageLimits image_limits(const SensorRig& rig, const VehicleModel& vehicle) noex
   return limits;
 }
 
+bool uses_plugin(const BackendNames& names) noexcept {
+  return is_plugin(names.map) || is_plugin(names.planner);
+}
+
 std::size_t backend_bytes(const Aabb& map_bounds_W, const ImageLimits& images) {
   return stages::BrickMap::arena_bytes(brick_config(map_bounds_W, images)) +
          stages::RrtStar::arena_bytes({}) + 4096;
 }
 
 MapAndPlanner make_backends(const BackendNames& names, const Aabb& map_bounds_W, const ImageLimits& images,
-                            core::Arena& arena) {
-  MapAndPlanner result{make_map(names.map, map_bounds_W, images, arena), make_planner(names.planner, arena)};
-  if (result.map == nullptr) throw InputError("map: not enough memory");
+                            core::Arena& arena, const OwnParts& own) {
+  const PartRequest request{map_bounds_W, images};
+  MapAndPlanner result{own.map ? own.map(request) : make_map(names.map, request, arena),
+                       own.planner ? own.planner(request) : make_planner(names.planner, request, arena)};
+  if (result.map == nullptr || result.planner == nullptr) throw InputError("map, planner: not enough memory");
   return result;
 }
 

@@ -1,7 +1,7 @@
-/// Maps and planners by name: any design flies with any of them.
+/// Maps and planners by name, or of the reader's own: any design flies with any of them.
 #pragma once
 
-#include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -9,28 +9,31 @@
 #include "core/memory/arena.hpp"
 #include "core/sensor_rig.hpp"
 #include "core/vehicle_model.hpp"
+#include "governor/policy/decision_policy.hpp"
+#include "platform/board/part_request.hpp"
+#include "platform/flight/flight_config.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/planning/planner.hpp"
 
 namespace roborun::board {
 
-/// Which map and planner: "own" or "octomap", "own" or "ompl:NAME".
+/// Which map and planner: "own" or "octomap", "own" or "ompl:NAME", or "plugin:FILE.so" (plugin.hpp).
 struct BackendNames {
   std::string map{"own"};
   std::string planner{"own"};
   friend bool operator==(const BackendNames&, const BackendNames&) = default;
 };
 
-/// What the map must be able to take.
-struct ImageLimits {
-  std::uint16_t width{}, height{};  ///< Pixels of the largest image, clouds' images included.
-  double range_m{};                 ///< The farthest that a sensor sees.
-  std::size_t frames{6};            ///< Most images of one scan.
-  /// So many images of cameras see all around; 0: there are not enough of them. (BrickMap::Config)
-  std::size_t all_around_frames{6};
-  double vehicle_radius_m{VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is.
+/// Parts that the reader's own program makes, once per flight. Empty: by name, and the governor that ships.
+struct OwnParts {
+  std::function<std::unique_ptr<stages::OccupancyMap>(const PartRequest&)> map{};
+  std::function<std::unique_ptr<stages::Planner>(const PartRequest&)> planner{};
+  std::function<std::unique_ptr<governor::DecisionPolicy>(const flight::FlightConfig&)> policy{};
+  [[nodiscard]] bool empty() const noexcept { return !map && !planner && !policy; }
 };
 [[nodiscard]] ImageLimits image_limits(const SensorRig& rig, const VehicleModel& vehicle) noexcept;
+
+[[nodiscard]] bool uses_plugin(const BackendNames& names) noexcept;
 
 struct MapAndPlanner {
   std::unique_ptr<stages::OccupancyMap> map;
@@ -39,8 +42,10 @@ struct MapAndPlanner {
 
 /// Bytes that the own backends take from the arena.
 [[nodiscard]] std::size_t backend_bytes(const Aabb& map_bounds_W, const ImageLimits& images);
-/// Throws InputError for unknown names, and for a world that the map cannot hold.
+/// Map and planner: those of `own` where it has some, the others by name. Throws InputError for unknown names,
+/// for a plugin that is none or another program's, and for a world that the map cannot hold.
 [[nodiscard]] MapAndPlanner make_backends(const BackendNames& names, const Aabb& map_bounds_W,
-                                          const ImageLimits& images, core::Arena& arena);
+                                          const ImageLimits& images, core::Arena& arena,
+                                          const OwnParts& own = {});
 
 }  // namespace roborun::board

@@ -343,6 +343,11 @@ Profile paper() {
 }
 
 std::string default_host_path(const BackendNames& backends) {
+  if (uses_plugin(backends))
+    throw InputError(
+        "--profile host: what a plugin costs is not kept, it may be built anew: must go with --host-file "
+        "FILE, or "
+        "be the file of roborun calibrate");
   std::string name = "host";
   if (!(backends == BackendNames{})) name = fmt::format("host-{}-{}", backends.map, backends.planner);
   std::replace(name.begin(), name.end(), ':', '_');

@@ -69,7 +69,7 @@ struct BoardSweep {
 /// also for a board that was measured with other backends.
 [[nodiscard]] Profile load_profile(const std::string& name, const BackendNames& backends);
 /// $XDG_CACHE_HOME/roborun/host.toml, or below $HOME/.cache, or in the working folder; for other backends
-/// than the own ones, host-MAP-PLANNER.toml.
+/// than the own ones, host-MAP-PLANNER.toml. Throws InputError for a plugin.
 [[nodiscard]] std::string default_host_path(const BackendNames& backends);
 
 }  // namespace roborun::board

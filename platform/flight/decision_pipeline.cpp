@@ -30,12 +30,12 @@ double arrival_s(const Trajectory& trajectory, const DecisionInput& in) noexcept
 }  // namespace
 
 DecisionPipeline::DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter,
-                                   governor::Governor& governor, stages::PointCloud& cloud,
+                                   governor::DecisionPolicy& policy, stages::PointCloud& cloud,
                                    stages::OccupancyMap& map, stages::Planner& planner,
                                    stages::Smoother& smoother) noexcept
     : config_(config),
       meter_(meter),
-      governor_(governor),
+      policy_(policy),
       cloud_(cloud),
       map_(map),
       planner_(planner),
@@ -91,7 +91,7 @@ bool DecisionPipeline::went_straight(const DecisionInput& in) const noexcept {
 }
 
 void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noexcept {
-  out.decision = governor_.decide(
+  out.decision = policy_.decide(
       out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing, out.motion, went_straight(in)});
   if (out.decision.predicted_s[index(core::StageId::kGovernor)] > 0.0)
     charge(core::StageId::kGovernor, {}, out);
@@ -256,7 +256,7 @@ void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noex
     const auto stage = static_cast<core::StageId>(i);
     // The straight way alone is a few cells: too little to tell how fast the processor is.
     if (stage == core::StageId::kPlanner && out.decision.open) continue;
-    governor_.observe(stage, out.decision.predicted_s[i], seconds(out.cost[i]));
+    policy_.observe(stage, out.decision.predicted_s[i], seconds(out.cost[i]));
   }
   failures_ = out.smoother_status == Status::kOk || in.climbing ? 0 : failures_ + 1;
 }

@@ -15,7 +15,7 @@
 #include "core/sensor_rig.hpp"
 #include "core/trajectory.hpp"
 #include "core/vehicle_model.hpp"
-#include "governor/policy/governor.hpp"
+#include "governor/policy/decision_policy.hpp"
 #include "platform/flight/motion_watch.hpp"
 #include "stages/perception/cloud_images.hpp"
 #include "stages/perception/occupancy_map.hpp"
@@ -82,8 +82,8 @@ struct DecisionOutput {
 /// Memory: everything is taken from the arena at construction. One thread.
 class DecisionPipeline {
  public:
-  /// The map and the planner are given from outside, so that any backend flies with any design.
-  DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter, governor::Governor& governor,
+  /// Policy, map and planner are given from outside, so that any backend flies with any design.
+  DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter, governor::DecisionPolicy& policy,
                    stages::PointCloud& cloud, stages::OccupancyMap& map, stages::Planner& planner,
                    stages::Smoother& smoother) noexcept;
 
@@ -146,7 +146,7 @@ class DecisionPipeline {
 
   PipelineConfig config_;
   core::StageMeter& meter_;
-  governor::Governor& governor_;
+  governor::DecisionPolicy& policy_;
   stages::PointCloud& cloud_;
   stages::OccupancyMap& map_;
   stages::Planner& planner_;

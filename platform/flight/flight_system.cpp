@@ -21,6 +21,8 @@ PipelineConfig pipeline_config(const FlightConfig& config, std::size_t cameras, 
   return pipeline;
 }
 
+}  // namespace
+
 governor::GovernorConfig governor_config(const FlightConfig& config) noexcept {
   const auto cost_of = [&config](core::StageId id) { return seconds(config.costs.cost(id, {})); };
   governor::GovernorConfig g;
@@ -39,8 +41,6 @@ governor::GovernorConfig governor_config(const FlightConfig& config) noexcept {
   g.minor_frame = config.minor_frame;
   return g;
 }
-
-}  // namespace
 
 Aabb map_bounds_W(const FlightConfig& config) noexcept {
   const Vector3 margin = Vector3::Constant(kMapMargin_m);
@@ -69,7 +69,8 @@ FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, 
     : map_(parts.map),
       cloud_({}, arena),
       governor_(governor_config(config)),
-      pipeline_(pipeline_config(config, cameras.size(), lidars.size()), meter, governor_, cloud_, parts.map,
+      policy_(parts.policy != nullptr ? *parts.policy : governor_),
+      pipeline_(pipeline_config(config, cameras.size(), lidars.size()), meter, policy_, cloud_, parts.map,
                 parts.planner, smoother_),
       control_(config.vehicle, seconds(config.minor_frame), config.gaze),
       flight_program_({config.vehicle, config.fence, config.answers}, control_, aircraft, mail_),

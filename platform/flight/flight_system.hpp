@@ -16,11 +16,15 @@
 
 namespace roborun::flight {
 
-/// The two stages that may be the reader's own. They outlive the system.
+/// What may be the reader's own. All outlive the system.
 struct FlightParts {
   stages::OccupancyMap& map;  ///< Of map_bounds_W(), at least.
   stages::Planner& planner;
+  governor::DecisionPolicy* policy{nullptr};  ///< Null: the governor that ships.
 };
+
+/// What the governor that ships is made from for this flight: where a policy that builds on it begins.
+[[nodiscard]] governor::GovernorConfig governor_config(const FlightConfig& config) noexcept;
 
 /// About 200 kB, without the memory in the arena: not for a small stack.
 class FlightSystem {
@@ -40,14 +44,15 @@ class FlightSystem {
   [[nodiscard]] FlightProgram& flight_program() noexcept { return flight_program_; }
   [[nodiscard]] const FailsafePilot& pilot() const noexcept { return flight_program_.pilot(); }
   [[nodiscard]] DecisionProgram& decision_program() noexcept { return decision_program_; }
-  [[nodiscard]] const governor::Governor& governor() const noexcept { return governor_; }
+  [[nodiscard]] const governor::DecisionPolicy& policy() const noexcept { return policy_; }
   [[nodiscard]] const stages::OccupancyMap& map() const noexcept { return map_; }
 
  private:
   stages::OccupancyMap& map_;
   stages::PointCloud cloud_;
   stages::Smoother smoother_;
-  governor::Governor governor_;
+  governor::Governor governor_;  ///< Idle if the policy is the reader's own.
+  governor::DecisionPolicy& policy_;
   DecisionPipeline pipeline_;
   FlightControl control_;
   LaneMail mail_;

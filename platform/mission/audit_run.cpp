@@ -123,7 +123,8 @@ rt::LaneSetConfig lane_config(const RealTimeConfig& config) {
   lanes.seal = config.seal;
   lanes.best_effort = config.best_effort;
   lanes.trace = config.trace;
-  if (config.mission.backends == board::BackendNames{}) lanes.unneeded_libraries = kBaselineLibraries;
+  if (config.mission.backends == board::BackendNames{} && config.mission.own.empty())
+    lanes.unneeded_libraries = kBaselineLibraries;
   return lanes;
 }
 
@@ -171,7 +172,7 @@ RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
       aircraft_(flight_config_.vehicle, config.mission.simulator, ground_below(world), config.mission.seed,
                 flight_config_.minor_frame, cameras_, outside(motor_bus_.get(), kill_lines_.get())),
       start_W_(aircraft_.vehicle().state().p_WB),
-      setup_(flight_config_, config.mission.backends, image_limits(config.mission)),
+      setup_(flight_config_, config.mission.backends, image_limits(config.mission), config.mission.own),
       system_(flight_config_, meter_, aircraft_, cameras_.cameras(), setup_.parts(), setup_.arena(),
               cameras_.lidars()),
       program_{Injected{system_.flight_program(), config.inject, over_},
@@ -361,7 +362,7 @@ report::AuditReport run_real_time(const sitl::World& world, const RealTimeConfig
 
 std::vector<report::PoolUse> memory_plan_of(const sitl::World& world, const MissionConfig& config) {
   const flight::FlightConfig flight = flight_config_of(world, config);
-  FlightSetup setup(flight, config.backends, image_limits(config));
+  FlightSetup setup(flight, config.backends, image_limits(config), config.own);
   sitl::CameraRig rig(world, config.simulator, config.seed);
   sitl::SimulatedAircraft aircraft(flight.vehicle, config.simulator, ground_below(world), config.seed,
                                    flight.minor_frame, rig);

@@ -5,11 +5,12 @@
 namespace roborun::mission {
 
 FlightSetup::FlightSetup(const flight::FlightConfig& config, const board::BackendNames& backends,
-                         const board::ImageLimits& images)
+                         const board::ImageLimits& images, const board::OwnParts& own)
     : block_(flight::FlightSystem::arena_bytes(config) + board::backend_bytes(map_bounds_W(config), images) +
              4096),
       arena_(block_),
-      parts_(board::make_backends(backends, map_bounds_W(config), images, arena_)) {}
+      parts_(board::make_backends(backends, map_bounds_W(config), images, arena_, own)),
+      policy_(own.policy ? own.policy(config) : nullptr) {}
 
 void FlightSetup::check() const {
   if (arena_.exhausted()) throw InputError("memory plan: the arena is too small for this world");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "core/memory/arena.hpp"
@@ -13,13 +14,13 @@ namespace roborun::mission {
 
 class FlightSetup {
  public:
-  /// Throws InputError for an unknown map or planner, or a world too large for the map.
+  /// Throws InputError as make_backends().
   FlightSetup(const flight::FlightConfig& config, const board::BackendNames& backends,
-              const board::ImageLimits& images);
+              const board::ImageLimits& images, const board::OwnParts& own = {});
   FlightSetup(const FlightSetup&) = delete;
   FlightSetup& operator=(const FlightSetup&) = delete;
 
-  [[nodiscard]] flight::FlightParts parts() noexcept { return {*parts_.map, *parts_.planner}; }
+  [[nodiscard]] flight::FlightParts parts() noexcept { return {*parts_.map, *parts_.planner, policy_.get()}; }
   [[nodiscard]] core::Arena& arena() noexcept { return arena_; }
   /// To be asked once the flight system stands. Throws InputError if the arena was too small.
   void check() const;
@@ -30,6 +31,7 @@ class FlightSetup {
   std::vector<std::byte> block_;
   core::Arena arena_;
   board::MapAndPlanner parts_;
+  std::unique_ptr<governor::DecisionPolicy> policy_;  ///< Null: the governor that ships.
 };
 
 }  // namespace roborun::mission

@@ -20,6 +20,8 @@
 namespace roborun::mission {
 namespace {
 
+constexpr const char* kCustom = "custom";  // what the caller brought, in reports
+
 double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0.0;
   std::sort(values.begin(), values.end());
@@ -83,7 +85,7 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
                     ? nullptr
                     : std::make_unique<FlightRecorder>(config.record, flight_config_, config, aircraft_,
                                                        cameras_, rig_.lidars())),
-      setup_(flight_config_, config.backends, image_limits(config)),
+      setup_(flight_config_, config.backends, image_limits(config), config.own),
       planner_(setup_.parts().planner, faults_.line()),
       flight_(flight_config_, recorder_ ? recorder_->aircraft() : aircraft_,
               recorder_ ? recorder_->cameras() : std::span<firmware_if::DepthCamera* const>(cameras_),
@@ -98,7 +100,7 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
 flight::FlightParts MissionRun::parts() {
   flight::FlightParts parts = setup_.parts();
   if (faults_.empty()) return parts;
-  return {parts.map, planner_};
+  return {parts.map, planner_, parts.policy};
 }
 
 /// Those that begin with the next minor frame.
@@ -161,11 +163,11 @@ void MissionRun::record_decision(const flight::DecisionOutput& out) {
 
 void MissionRun::summarise(double wall_s) {
   report::MissionResult& r = report_.result;
-  r.design = governor::to_string(config_.flight.design);
+  r.design = config_.own.policy ? kCustom : governor::to_string(config_.flight.design);
   r.profile = config_.profile_name;
   r.seed = config_.seed;
-  r.map = config_.backends.map;
-  r.planner = config_.backends.planner;
+  r.map = config_.own.map ? kCustom : config_.backends.map;
+  r.planner = config_.own.planner ? kCustom : config_.backends.planner;
   r.mission_time_s = seconds(flight_.now().time_since_epoch());
   r.mean_velocity_mps = r.mission_time_s > 0.0 ? r.distance_m / r.mission_time_s : 0.0;
   r.energy_kJ = 1e-3 * aircraft_.vehicle().state().energy_J;
@@ -181,7 +183,7 @@ void MissionRun::summarise(double wall_s) {
   r.precision_m = {quantile(precision_m, 0.0), quantile(precision_m, 0.5), quantile(precision_m, 1.0)};
   r.real_time_factor = wall_s > 0.0 ? r.mission_time_s / wall_s : 0.0;
   r.map_bytes = system_.map().bytes();
-  r.speed_limit_mps = system_.governor().v_max_mps();
+  r.speed_limit_mps = system_.policy().v_max_mps();
   hash_.add(system_.map().digest());
   r.state_hash = fmt::format("{:016x}", hash_.value());
 }

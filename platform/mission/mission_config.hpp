@@ -53,6 +53,7 @@ struct MissionConfig {
   std::uint64_t seed{1};              ///< Of the planner, and of all noise, faults and gusts.
   flight::FlightConfig flight{};      ///< What the world gives (bounds, goal, height) is filled in from it.
   board::BackendNames backends{};
+  board::OwnParts own{};  ///< In the place of backends and governor; such a flight is not recorded.
   sitl::SimulatorConfig simulator{};
   SlowDown slow_down{};
   JudgeConfig judge{};

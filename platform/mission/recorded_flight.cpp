@@ -185,6 +185,8 @@ RecordedFlight recorded_flight_from(std::span<const std::byte> json) {
   flight.design = design_of("design", j.at("design").get<std::string>());
   flight.seed = j.at("seed").get<std::uint64_t>();
   recorded.backends = {j.at("map").get<std::string>(), j.at("planner").get<std::string>()};
+  // A file that came from elsewhere does not choose what code is loaded.
+  if (uses_plugin(recorded.backends)) throw InputError("map, planner: must not be plugins");
   flight.minor_frame = Nanos{j.at("minor_frame_ns").get<std::int64_t>()};
   const auto rate_Hz = static_cast<int>(1e9 / number(j, "minor_frame_ns", 1e6, 1e9));
   if (!core::is_flight_rate(rate_Hz) || core::minor_frame_of(rate_Hz) != flight.minor_frame)

@@ -11,6 +11,11 @@ namespace {
 
 /// Throws if the flight depends on what does not cross the boundary.
 const std::string& recordable(const std::string& path, const MissionConfig& config) {
+  if (!config.own.empty() || uses_plugin(config.backends))
+    throw InputError(
+        fmt::format("{}: a recording is flown again without code of others: must be a flight with map and "
+                    "planner by name",
+                    path));
   for (const TimedFault& f : config.faults) {
     for (const sitl::Component component :
          {sitl::Component::kCpu, sitl::Component::kPlanner, sitl::Component::kMap}) {

@@ -38,6 +38,12 @@ refuses "cannot be written" calibrate --repeats 1 --out /nonexistent/x.toml
 refuses "whole number" fly --seed -1
 refuses "whole number" fly --seed 1x
 refuses "own or octomap" fly --map foo
+refuses "cannot be loaded" fly --map plugin:nope.so
+refuses "cannot be loaded" fly --planner plugin:nope.so
+refuses "must be plugin:FILE.so" fly --planner plugin:
+refuses "cannot be loaded" calibrate --repeats 1 --planner plugin:nope.so
+refuses "must go with --host-file" fly --profile host --planner plugin:nope.so
+refuses "must be those that ship" sweep --planner plugin:nope.so --out /tmp/roborun_cli_test_sweep.$$
 refuses "must be own or ompl:NAME" fly --planner ompl:Foo
 refuses "deadline or all" fly --color red
 refuses "package_delivery or search_and_rescue" fly --mission x

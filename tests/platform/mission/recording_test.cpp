@@ -198,7 +198,8 @@ TEST_F(Replay, RefusesAConfigurationThatNobodyWrote) {
   const auto refused = [&](const char* wanted, const MissionConfig& config) {
     const std::string path = test::scratch("config.rec");
     sitl::CameraRig rig(world_, config_.simulator, 1);
-    sitl::SimulatedAircraft aircraft(config_.simulator, ground_below(world_), 1, core::kMinorFrame, rig);
+    sitl::SimulatedAircraft aircraft(config_.flight.vehicle, config_.simulator, ground_below(world_), 1,
+                                     core::kMinorFrame, rig);
     { FlightRecorder recorder(path, flight_config_of(world_, config), config, aircraft, rig.cameras()); }
     try {
       (void)replay_flight(path, {});

@@ -1,0 +1,117 @@
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+
+#include "platform/board/board_profile.hpp"
+#include "platform/flight/flight_system.hpp"
+#include "platform/input/input_error.hpp"
+#include "platform/mission/mission.hpp"
+#include "platform/mission/recorded_flight.hpp"
+#include "platform/sitl/world/world_file.hpp"
+#include "stages/perception/octomap_backend/octomap_backend.hpp"
+#include "stages/planning/ompl_backend/ompl_backend.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace roborun::mission {
+namespace {
+
+/// Asks the governor that ships, and counts.
+class PassingPolicy final : public governor::DecisionPolicy {
+ public:
+  PassingPolicy(const governor::GovernorConfig& config, int& decisions) noexcept
+      : governor_(config), decisions_(decisions) {}
+  [[nodiscard]] governor::Decision decide(const SpaceProfile& profile,
+                                          const governor::Situation& situation) noexcept override {
+    ++decisions_;
+    return governor_.decide(profile, situation);
+  }
+  void observe(core::StageId id, double predicted_s, double spent_s) noexcept override {
+    governor_.observe(id, predicted_s, spent_s);
+  }
+  [[nodiscard]] double v_max_mps() const noexcept override { return governor_.v_max_mps(); }
+
+ private:
+  governor::Governor governor_;
+  int& decisions_;
+};
+
+class OwnPartsTest : public ::testing::Test {
+ protected:
+  OwnPartsTest() : world_(sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {})) {
+    config_.flight.costs = board::paper().costs;
+    config_.flight.model = board::paper().model;
+  }
+  /// The one line with which the flight is refused; empty if it is not.
+  [[nodiscard]] std::string refusal() const {
+    try {
+      (void)fly_mission(world_, config_, {});
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return {};
+  }
+  sitl::World world_;
+  MissionConfig config_;
+};
+
+TEST_F(OwnPartsTest, APolicyThatAsksTheGovernorFliesTheSameBits) {
+  const std::string hash = fly_mission(world_, config_, {}).result.state_hash;
+  int decisions = 0;
+  config_.own.policy = [&decisions](const flight::FlightConfig& config) {
+    return std::make_unique<PassingPolicy>(flight::governor_config(config), decisions);
+  };
+  const report::MissionResult own = fly_mission(world_, config_, {}).result;
+  EXPECT_EQ(own.state_hash, hash);
+  EXPECT_EQ(static_cast<std::uint64_t>(decisions), own.decisions);
+  EXPECT_GT(decisions, 5);
+  EXPECT_EQ(own.design, "custom");
+}
+
+TEST_F(OwnPartsTest, MapAndPlannerFromFactoriesFlyAsThoseByName) {
+  config_.judge.time_limit_s = 8.0;  // the stock map is slow
+  config_.simulator.camera.pixels = 32;
+  config_.backends = {"octomap", "ompl:RRTstar"};
+  const report::MissionResult by_name = fly_mission(world_, config_, {}).result;
+  config_.backends = {};
+  config_.own.map = [](const board::PartRequest& r) {
+    return stages::make_octomap_backend({r.map_bounds_W, r.images.vehicle_radius_m, r.images.range_m + 5.0});
+  };
+  config_.own.planner = [](const board::PartRequest&) { return stages::make_ompl_planner("RRTstar", {}); };
+  const report::MissionResult own = fly_mission(world_, config_, {}).result;
+  EXPECT_GT(own.decisions, 0U);
+  EXPECT_EQ(own.state_hash, by_name.state_hash);
+  EXPECT_EQ(own.map, "custom");
+  EXPECT_EQ(own.planner, "custom");
+}
+
+TEST_F(OwnPartsTest, AFactoryThatMakesNothingIsRefused) {
+  config_.own.planner = [](const board::PartRequest&) { return nullptr; };
+  EXPECT_NE(refusal().find("not enough memory"), std::string::npos) << refusal();
+}
+
+TEST_F(OwnPartsTest, AreNotRecorded) {
+  config_.record = test::scratch("own.rec");
+  config_.backends.planner = "plugin:x.so";
+  EXPECT_NE(refusal().find("must be a flight with map and planner by name"), std::string::npos) << refusal();
+  config_.backends = {};
+  config_.own.planner = [](const board::PartRequest&) { return stages::make_ompl_planner("RRTstar", {}); };
+  EXPECT_NE(refusal().find("must be a flight with map and planner by name"), std::string::npos) << refusal();
+}
+
+TEST_F(OwnPartsTest, ARecordingDoesNotChooseWhatCodeIsLoaded) {
+  RecordedFlight recorded;
+  recorded.flight = flight_config_of(world_, config_);
+  recorded.images = image_limits(config_);
+  recorded.mounts.emplace_back();
+  const auto read = [&recorded] {
+    const std::string json = to_json(recorded);
+    return recorded_flight_from(std::as_bytes(std::span(json)));
+  };
+  EXPECT_EQ(read().backends, board::BackendNames{});
+  recorded.backends.map = "plugin:/tmp/x.so";
+  EXPECT_THROW((void)read(), InputError);
+}
+
+}  // namespace
+}  // namespace roborun::mission
