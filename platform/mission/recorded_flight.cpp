@@ -82,12 +82,23 @@ VehicleModel read_vehicle(const Json& json) {
   VehicleModel vehicle;
   for (const VehicleKey& key : kVehicleKeys)
     vehicle.*key.value = number(json.at(key.table), key.key, key.low, key.high);
+  vehicle.measured_stopping.reset();
+  if (json.contains("stopping")) {
+    const Json& stopping = json.at("stopping");
+    vehicle.measured_stopping =
+        StoppingModel{number(stopping, "quadratic_s2pm", 0, 10), number(stopping, "linear_s", 0, 10),
+                      number(stopping, "constant_m", -10, 10)};
+  }
   return vehicle;
 }
 
 Json vehicle_json(const VehicleModel& vehicle) {
   Json j;
   for (const VehicleKey& key : kVehicleKeys) j[key.table][key.key] = vehicle.*key.value;
+  if (const auto& stopping = vehicle.measured_stopping)
+    j["stopping"] = {{"quadratic_s2pm", stopping->quadratic_s2pm},
+                     {"linear_s", stopping->linear_s},
+                     {"constant_m", stopping->constant_m}};
   return j;
 }
 

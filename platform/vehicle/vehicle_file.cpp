@@ -25,6 +25,12 @@ bool is_whole(std::string_view key) {
   return key == "width" || key == "height" || key == "rings" || key == "columns";
 }
 
+/// In the middle of the vehicle, and not turned: what a mount is without these.
+bool is_mount(std::string_view key) {
+  return key == "x_m" || key == "y_m" || key == "z_m" || key == "yaw_deg" || key == "pitch_deg" ||
+         key == "roll_deg";
+}
+
 std::set<std::string_view> tables() {
   std::set<std::string_view> names{"vehicle", "stopping", "camera", "lidar"};
   for (const VehicleKey& key : kVehicleKeys) names.insert(key.table);
@@ -109,6 +115,7 @@ class VehicleReader {
     std::set<std::string_view> known;
     for (const SensorKey<Spec>& key : keys_of(sensor)) {
       known.insert(key.key);
+      if (is_mount(key.key) && from.get(key.key) == nullptr) continue;
       const toml::node& node = reader_.need(from, key.key, where);
       const double value = reader_.number(node, key.key, key.low, key.high);
       if (is_whole(key.key) && value != std::floor(value))

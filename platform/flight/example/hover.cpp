@@ -22,7 +22,7 @@ int main() {
   stages::BrickMap::Config map_config;
   map_config.bounds_W = flight::map_bounds_W(config);
   const stages::RrtStar::Config planner_config;
-  std::vector<std::byte> block(flight::FlightSystem::arena_bytes() +
+  std::vector<std::byte> block(flight::FlightSystem::arena_bytes(config) +
                                stages::BrickMap::arena_bytes(map_config) +
                                stages::RrtStar::arena_bytes(planner_config) + 4096);
   core::Arena arena(block);

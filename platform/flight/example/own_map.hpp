@@ -54,13 +54,15 @@ class VoxelMap final : public roborun::stages::OccupancyMap {
     for (std::size_t i = 0; i < image.depth_m.size(); ++i) {
       if (i % image.width == 0 && budget.spent(work)) return false;
       const double depth_m = static_cast<double>(image.depth_m[i]);
-      if (!(depth_m > 0.0)) continue;  // NaN too: no information
+      if (!(depth_m > static_cast<double>(image.range_min_m))) continue;  // NaN too: no information
       // firmware_if/depth_camera.hpp: x along the optical axis, y left, z up.
-      const double t = static_cast<double>(image.tan_half_fov_ratio);
+      const double across = static_cast<double>(image.tan_half_width);
+      const double along = static_cast<double>(image.tan_half_height);
       const std::size_t row = i / image.width, column = i % image.width;
       const double u = (static_cast<double>(column) + 0.5) / image.width;
       const double v = (static_cast<double>(row) + 0.5) / image.height;
-      const Vector3 ray_W = posed.X_WC.R_RT * Vector3(1.0, t - 2.0 * t * u, t - 2.0 * t * v);
+      const Vector3 ray_W =
+          posed.X_WC.R_RT * Vector3(1.0, across - 2.0 * across * u, along - 2.0 * along * v);
       const double end_m = std::min(static_cast<double>(image.range_m), reach_m / ray_W.norm());
       if (state == CellState::kOccupied) {
         if (depth_m <= end_m) cells_.set(posed.X_WC.p_RT + depth_m * ray_W, state);

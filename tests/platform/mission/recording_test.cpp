@@ -14,6 +14,7 @@
 #include "platform/mission/replay.hpp"
 #include "platform/sitl/aircraft/camera_rig.hpp"
 #include "platform/sitl/world/world_file.hpp"
+#include "platform/vehicle/vehicle_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace roborun::mission {
@@ -126,6 +127,13 @@ TEST_F(Replay, HoldsDifferentCamerasAndALidar) {
       << "recording changed the flight";
 }
 
+TEST_F(Replay, HoldsAVehicleWhoseStoppingNobodyMeasured) {
+  set_vehicle(config_, vehicle::load_vehicle("x500"));
+  ASSERT_FALSE(config_.flight.vehicle.measured_stopping.has_value()) << "else nothing is tested";
+  const ReplayResult r = replay_flight(record(), {});
+  EXPECT_TRUE(r.same()) << "frame " << r.diverged_in << " of " << r.recorded.minor_frames;
+}
+
 TEST_F(Replay, AnswersToFaultsAndKeepsTheFenceAsTheRecordedFlightDid) {
   ASSERT_EQ(config_.flight.fence.set_altitude(-5.0, 9.0), core::FenceFault::kNone);
   ASSERT_EQ(config_.flight.fence.add_circle(core::FenceSide::kKeepIn, {20.0, 0.0}, 500.0),
@@ -190,7 +198,8 @@ TEST_F(Replay, RefusesAConfigurationThatNobodyWrote) {
   const auto refused = [&](const char* wanted, const MissionConfig& config) {
     const std::string path = test::scratch("config.rec");
     sitl::CameraRig rig(world_, config_.simulator, 1);
-    sitl::SimulatedAircraft aircraft(config_.simulator, ground_below(world_), 1, core::kMinorFrame, rig);
+    sitl::SimulatedAircraft aircraft(config_.flight.vehicle, config_.simulator, ground_below(world_), 1,
+                                     core::kMinorFrame, rig);
     { FlightRecorder recorder(path, flight_config_of(world_, config), config, aircraft, rig.cameras()); }
     try {
       (void)replay_flight(path, {});

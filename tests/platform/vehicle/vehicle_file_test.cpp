@@ -36,6 +36,70 @@ TEST(VehicleFile, EveryShippedVehicleReadsAndCanFly) {
   }
 }
 
+constexpr const char* kCamera = R"(
+[[camera]]
+width = 640
+height = 480
+horizontal_fov_deg = 87
+vertical_fov_deg = 58
+range_min_m = 0.3
+range_m = 10
+rate_Hz = 30
+latency_s = 0.03
+x_m = 0.12
+)";
+constexpr const char* kLidar = R"(
+[[lidar]]
+rings = 16
+columns = 900
+lowest_deg = -15
+highest_deg = 15
+range_min_m = 0.5
+range_m = 70
+rate_Hz = 10
+latency_s = 0.02
+)";
+
+/// The shipped paper vehicle without its cameras.
+std::string blind_paper() {
+  const std::string text = kShippedVehicles[0].text;
+  return text.substr(0, text.find("[[camera]]"));
+}
+
+TEST(VehicleFile, HoldsItsSensors) {
+  const Vehicle v = vehicle_from_toml("mine.toml", blind_paper() + kCamera + kLidar);
+  ASSERT_EQ(v.rig.cameras.size(), 1U);
+  EXPECT_EQ(v.rig.cameras[0].width, 640);
+  EXPECT_NEAR(v.rig.cameras[0].tan_half_width, 0.94896, 1e-5);
+  EXPECT_EQ(v.rig.cameras[0].mount.x_m, 0.12);
+  EXPECT_EQ(v.rig.cameras[0].mount.z_m, 0.0);
+  ASSERT_EQ(v.rig.lidars.size(), 1U);
+  EXPECT_EQ(v.rig.lidars[0].range_m, 70.0);
+}
+
+TEST(VehicleFile, RefusesSensorsThatCannotBe) {
+  const std::string paper = blind_paper();
+  EXPECT_NE(refusal(paper).find("camera: missing"), std::string::npos) << "a vehicle that sees nothing";
+  const auto with = [&](const char* what, const char* instead) {
+    return refusal(paper + replaced(kCamera, what, instead));
+  };
+  EXPECT_EQ(refusal(paper + kCamera), "");
+  EXPECT_NE(with("width = 640", "width = 1281").find("width: must be a number from 8 to 1280"),
+            std::string::npos);
+  EXPECT_NE(with("width = 640", "width = 64.5").find("width: must be a whole number"), std::string::npos);
+  EXPECT_NE(with("vertical_fov_deg = 58", "vertical_fov_deg = 0").find("vertical_fov_deg: must be"),
+            std::string::npos);
+  EXPECT_NE(with("range_m = 10", "range_m = nan").find("range_m: must be"), std::string::npos);
+  EXPECT_NE(with("range_min_m = 0.3", "range_min_m = 10").find("range_m: must be more than range_min_m"), std::string::npos);
+  EXPECT_NE(with("rate_Hz = 30\n", "").find("rate_Hz: missing in [[camera]]"), std::string::npos);
+  EXPECT_NE(with("x_m", "xx_m").find("xx_m: unknown key in [[camera]]"), std::string::npos);
+  EXPECT_NE(with("x_m = 0.12", "yaw_deg = 180").find("cannot see where it flies"),
+            std::string::npos);
+  std::string nine = paper;
+  for (int i = 0; i < 9; ++i) nine += kCamera;
+  EXPECT_NE(refusal(nine).find("camera: must be at most 8"), std::string::npos);
+}
+
 TEST(VehicleFile, PaperIsTheDefaultToTheBit) {
   const VehicleModel paper = load_vehicle("paper").model;
   const VehicleModel standard;
