@@ -14,7 +14,7 @@ class Planner final : public stages::Planner {
 
 class Map final : public stages::OccupancyMap, stages::MapView {
  public:
-  explicit Map(const PartRequest& request) : side_(request.images.side_pixels) {}
+  explicit Map(const PartRequest& request) : side_(request.images.width) {}
   [[nodiscard]] Status integrate(const stages::IntegrationRequest&, core::StageBudget&,
                                  stages::IntegrationResult&) noexcept override {
     return Status::kInvalidArgument;

@@ -12,7 +12,7 @@
 namespace roborun::board {
 namespace {
 
-const PartRequest kRequest{{Vector3(-10, -10, 0), Vector3(10, 10, 10)}, {64, 25.0}};
+const PartRequest kRequest{{Vector3(-10, -10, 0), Vector3(10, 10, 10)}, {64, 64, 25.0}};
 
 std::string plugin(const char* name) { return std::string("plugin:") + ROBORUN_PLUGINS + "/" + name; }
 
