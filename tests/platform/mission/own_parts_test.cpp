@@ -102,8 +102,8 @@ TEST_F(OwnPartsTest, AreNotRecorded) {
 TEST_F(OwnPartsTest, ARecordingDoesNotChooseWhatCodeIsLoaded) {
   RecordedFlight recorded;
   recorded.flight = flight_config_of(world_, config_);
-  recorded.images = image_limits(config_);
-  recorded.mounts.emplace_back();
+  recorded.sensors = sitl::rig_of(config_.simulator);
+  recorded.mounts.resize(recorded.sensors.cameras.size());
   const auto read = [&recorded] {
     const std::string json = to_json(recorded);
     return recorded_flight_from(std::as_bytes(std::span(json)));
