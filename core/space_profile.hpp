@@ -19,7 +19,6 @@ struct SpaceProfile {
   double gap_average_m{};  ///< Mean gap between neighbouring obstacles in view; +inf if fewer than two.
   /// Distance from the vehicle's centre to the nearest surface; +inf if none in view.
   double closest_obstacle_m{};
-  double obstacle_ahead_m{};  ///< The same within 45 degrees of the way to the goal; 0 if not all was seen.
   /// Visibility d: free distance ahead along the motion (or towards the goal at rest).
   double closest_unknown_m{};
   double sensor_volume_m3{};  ///< Space that the depth images of this decision see.

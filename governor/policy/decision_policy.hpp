@@ -22,7 +22,6 @@ struct Situation {
   double distance_to_goal_m{};
   bool surveying{};  ///< The flight goes on to its hover whatever comes of this decision.
   bool motion{};     ///< Something moves nearby.
-  bool straight{};   ///< The plan before goes straight towards the goal, for most of what can be seen.
 };
 
 /// What was decided, and why.
@@ -34,7 +33,6 @@ struct Decision {
   SolverSolution solution{};
   core::StageArray<double> predicted_s{};
   double demand_m{};  ///< Coarsest cell that the space allows: min((g_avg - width) / 4, d_obs / 2).
-  bool open{};        ///< Nothing stands ahead: the straight way, as far as it is free, is the plan.
 };
 
 /// Contract:

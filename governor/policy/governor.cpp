@@ -75,7 +75,7 @@ Status Policy::validate() const noexcept {
   const bool precision_ok = core::within(failures_until_finer, 1, 100) &&
                             core::within(coarser_levels_per_decision, 1, kPrecisionLevels) &&
                             core::within(cells_to_obstacle, 1.0, 100.0);
-  const bool volume_ok = core::above(planner_share, 0.0, 1.0) && core::above(open_planner_m3, 0.0, 1e6);
+  const bool volume_ok = core::above(planner_share, 0.0, 1.0);
   const bool speed_ok = core::within(near_goal_m, 0.0, 1000.0) &&
                         core::above(near_goal_speed_mps, 0.0, 30.0) &&
                         core::above(motion_speed_mps, 0.0, 30.0);
@@ -298,11 +298,7 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   double time_s = deadline_s(task, asked, d);                // 2
   const Precision precision = in_time(task, asked, time_s);  // 3
 
-  // 4. In the open there is nothing to search for.
-  d.open = situation.straight && situation.failures == 0 && !situation.motion &&
-           profile.obstacle_ahead_m == std::numeric_limits<double>::infinity();
-  const double share_m3 = policy.planner_share * see_m3;
-  const double plan_m3 = d.open ? std::min(policy.open_planner_m3, share_m3) : share_m3;
+  const double plan_m3 = policy.planner_share * see_m3;  // 4
   d.problem = problem_of(task, precision, time_s, plan_m3);
   d.solution = solve(d.problem);
   fill_prediction(d);

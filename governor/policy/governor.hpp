@@ -40,10 +40,7 @@ struct Policy {
   /// At least so many cells between the vehicle and the nearest obstacle. [1, 100]
   double cells_to_obstacle{2.0};
   double planner_share{0.4};  ///< Of the perceived space, what a plan through it explores at most. (0, 1]
-  /// The same in the open: not quite two of the planner's cells of 4.8 m, so that with the ends of the
-  /// straight way the search is over. The deadline stays that of a search. (0, 1e6]
-  double open_planner_m3{220.0};
-  double near_goal_m{8.0};          ///< Nearer than this: at most 0.6 m cells [0, 1000] ...
+  double near_goal_m{8.0};    ///< Nearer than this: at most 0.6 m cells [0, 1000] ...
   double near_goal_speed_mps{2.5};  ///< ... and this speed. (0, 30]
   /// While something moves nearby: no longer thinking than precision asks for, and this speed. At 2.5 m/s,
   /// and without stopping at once what is faster, 8 of 40 crossings ended in a collision. (0, 30]

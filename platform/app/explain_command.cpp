@@ -60,7 +60,6 @@ std::string words_of_active(const std::string& active) {
       {"v0_max", "perception is at the upper end of its knob"},
       {"v1_max", "export is at the upper end of its knob"},
       {"v2_max", "the planner is at the upper end of its knob: more is of no use"},
-      {"open", "nothing stands ahead and the plan before went straight on: no search"},
       {"g_avg", "cells could be coarser but for the precision that the space asks for"},
       {"d_obs", "cells could be coarser but for the nearest obstacle"},
       {"g_min", "cells could be finer, but then not all that is in view would fit into the time"},

@@ -16,8 +16,6 @@ constexpr std::size_t kTrajectoryPoints = 32;
 constexpr double kCornerRoom_m = 0.25;
 constexpr double kAtRest_mps = 0.05;
 constexpr double kTooFast = 1.5;
-constexpr double kStraightShare = 2.0 / 3.0;  // of the horizon
-constexpr double kCollinear = 1.0 - 1e-6;     // cosine
 /// What the way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
 constexpr double kBeyond_mps = 2.0;
 
@@ -64,10 +62,7 @@ core::MeteredBudget DecisionPipeline::table_budget_of(core::StageId id) noexcept
 void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) noexcept {
   core::MeteredBudget budget = table_budget_of(core::StageId::kPointCloud);
   core::Work work;
-  const std::uint64_t refused = cloud_.counters().frames_refused;
-  const bool sees_all = cloud_.step(in.frames, 0, budget, work) == Status::kOk &&
-                        cloud_.counters().frames_refused == refused && in.frames.size() >= config_.images &&
-                        config_.sees_all_around;
+  (void)cloud_.step(in.frames, 0, budget, work);
   const double r_m = radius_m();
   const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m),
                         config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
@@ -76,23 +71,15 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   (void)profile_space({.vehicle_width_m = 2.0 * config_.vehicle.radius_m}, cloud_.points(), map_.view(),
                       *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W, relevant_W, r_m, out.profile,
                       budget, work);
-  if (!sees_all) out.profile.obstacle_ahead_m = 0.0;
   out.profile.sensor_volume_m3 = cloud_.seen_volume_m3();
   // What the map will hold once this decision's images are in it.
   out.profile.map_volume_m3 = map_.known_volume_m3() + cloud_.seen_volume_m3();
   charge(core::StageId::kPointCloud, work, out);
 }
 
-bool DecisionPipeline::went_straight(const DecisionInput& in) const noexcept {
-  if (kept_W_.size() != 2) return false;
-  const Vector3 way = kept_W_[1] - kept_W_[0], to_goal = in.goal_W - kept_W_[0];
-  return way.norm() >= kStraightShare * config_.horizon_m &&
-         way.dot(to_goal) >= kCollinear * way.norm() * to_goal.norm();
-}
-
 void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noexcept {
-  out.decision = policy_.decide(
-      out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing, out.motion, went_straight(in)});
+  out.decision =
+      policy_.decide(out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing, out.motion});
   if (out.decision.predicted_s[index(core::StageId::kGovernor)] > 0.0)
     charge(core::StageId::kGovernor, {}, out);
 }
@@ -100,7 +87,10 @@ void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noex
 Vector3 DecisionPipeline::assumed_half_m(const DecisionInput& in) const noexcept {
   constexpr double kMost_m = 5.0;
   const MonotonicTime climbed = in.committed->start_time + from_seconds(in.committed->duration_s());
-  if (config_.sees_all_around || !in.climbing || in.now < climbed) return Vector3::Zero();
+  // Decisions that are long may all begin before or after the short hover of the climb: until there is a plan,
+  // the vehicle hovers where the climb ended.
+  const bool hovers = in.now >= climbed && (in.climbing || !has_planned_);
+  if (config_.sees_all_around || !hovers) return Vector3::Zero();
   // What has to be free around the start of a plan, and as far as the sensors see less of it than that while the
   // vehicle turns: at a distance of d they see d * ratio up and down.
   const double half_m = radius_m() + kCornerRoom_m + kFinestCell_m;
@@ -254,8 +244,6 @@ void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noex
   }
   for (std::size_t i = 0; i < core::kStageCount; ++i) {
     const auto stage = static_cast<core::StageId>(i);
-    // The straight way alone is a few cells: too little to tell how fast the processor is.
-    if (stage == core::StageId::kPlanner && out.decision.open) continue;
     policy_.observe(stage, out.decision.predicted_s[i], seconds(out.cost[i]));
   }
   failures_ = out.smoother_status == Status::kOk || in.climbing ? 0 : failures_ + 1;
@@ -271,6 +259,7 @@ void DecisionPipeline::choose(const DecisionInput& in, DecisionOutput& out) noex
                      draft_.takes_over < brakes && has_new &&
                      arrival_s(*in.committed, in) <= arrival_s(draft_.trajectory, in);
   if (has_new && !keeps) {
+    has_planned_ = true;
     out.kind = DecisionKind::kNew;
     out.trajectory = draft_.trajectory;
     return;

@@ -29,7 +29,6 @@ namespace roborun::flight {
 struct PipelineConfig {
   Aabb flight_bounds_W{};  ///< The vehicle's centre stays inside.
   VehicleModel vehicle{};
-  std::size_t images{6};  ///< Of all sensors: what fewer images do not show may be anything.
   /// The sensors together see every direction; false: what they do not see may be anything.
   bool sees_all_around{true};
   double level_view_ratio{1.0};  ///< FlightConfig::level_view_ratio.
@@ -117,8 +116,6 @@ class DecisionPipeline {
 
   void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
   void perceive(const DecisionInput& in, DecisionOutput& out) noexcept;
-  /// The plan before: straight towards the goal, for most of what can be seen.
-  [[nodiscard]] bool went_straight(const DecisionInput& in) const noexcept;
   void govern(const DecisionInput& in, DecisionOutput& out) noexcept;
   void integrate(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// Half edges of the box that a vehicle at the top of its climb takes to be free (IntegrationRequest).
@@ -153,6 +150,7 @@ class DecisionPipeline {
   stages::Smoother& smoother_;
   stages::Path kept_W_;  ///< What was planned last.
   MotionWatch motion_;
+  bool has_planned_{false};  ///< A plan was found since the take-off.
   Draft draft_;
   int failures_{0};  ///< Decisions in a row without a trajectory.
 };

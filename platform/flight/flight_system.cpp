@@ -7,12 +7,11 @@ namespace {
 
 constexpr double kMapMargin_m = 3.0;
 
-PipelineConfig pipeline_config(const FlightConfig& config, std::size_t cameras, std::size_t lidars) noexcept {
+PipelineConfig pipeline_config(const FlightConfig& config) noexcept {
   PipelineConfig pipeline;
   pipeline.flight_bounds_W = config.bounds_W;
   pipeline.vehicle = config.vehicle;
   pipeline.map_bounds_W = map_bounds_W(config);
-  pipeline.images = cameras + lidars * stages::CloudImages::kImages;
   pipeline.level_view_ratio = config.level_view_ratio;
   pipeline.sees_all_around = config.sees_all_around;
   pipeline.horizon_m = config.camera_range_m - 1.0;
@@ -70,8 +69,7 @@ FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, 
       cloud_({}, arena),
       governor_(governor_config(config)),
       policy_(parts.policy != nullptr ? *parts.policy : governor_),
-      pipeline_(pipeline_config(config, cameras.size(), lidars.size()), meter, policy_, cloud_, parts.map,
-                parts.planner, smoother_),
+      pipeline_(pipeline_config(config), meter, policy_, cloud_, parts.map, parts.planner, smoother_),
       control_(config.vehicle, seconds(config.minor_frame), config.gaze),
       flight_program_({config.vehicle, config.fence, config.answers}, control_, aircraft, mail_),
       decision_program_({config.goal_W, config.seed, config.fence, config.minor_frame}, pipeline_, cameras,

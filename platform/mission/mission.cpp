@@ -143,7 +143,6 @@ void MissionRun::record_decision(const flight::DecisionOutput& out) {
   for (const governor::Reason reason : governor::kReasons) {
     if ((solution.active & reason) != 0) active(governor::to_string(reason));
   }
-  if (out.decision.open) active("open");
   r.speed_limit_mps = point.speed_limit_mps;
   r.visible_m = out.profile.closest_unknown_m;
   r.closest_obstacle_m = out.profile.closest_obstacle_m;

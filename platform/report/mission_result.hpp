@@ -64,7 +64,7 @@ struct DecisionRecord {
   std::array<double, core::kStageCount> stage_s{};  ///< Spent.
   std::array<double, core::kStageCount> predicted_s{};
   std::string solver;  ///< Status of the solver.
-  std::string active;  ///< Names of the active constraints and reasons, and `open`, with + between.
+  std::string active;  ///< Names of the active constraints and reasons, with + between.
   double demand_m{};   ///< Coarsest cell that the space allows.
   double speed_limit_mps{};
   double visible_m{};

@@ -15,7 +15,6 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kSectors = 72;
 constexpr double kSameObstacle_m = 3.0;
-constexpr double kAhead = 0.70710678118654752;  // cosine of 45 degrees
 
 struct Sector {
   double range_m{kInfinity};
@@ -29,22 +28,16 @@ double distance_m(const Sector& a, const Sector& b) noexcept {
 
 /// False if the budget was spent before the last point.
 bool profile_points(const SpaceProfilerConfig& config, std::span<const CloudPoint> points,
-                    const Vector3& p_WB, const Vector3& goal_W, const Aabb& relevant_W,
-                    core::StageBudget& budget, const core::Work& work, SpaceProfile& profile) noexcept {
+                    const Vector3& p_WB, const Aabb& relevant_W, core::StageBudget& budget,
+                    const core::Work& work, SpaceProfile& profile) noexcept {
   std::array<Sector, kSectors> sector{};
-  profile.closest_obstacle_m = profile.obstacle_ahead_m = kInfinity;
-  const Vector3 way = goal_W - p_WB;
-  const double way_m = way.norm();
+  profile.closest_obstacle_m = kInfinity;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (i % 1024 == 0 && budget.spent(work)) return false;
     const CloudPoint& point = points[i];
     const Vector3 offset = point.p_W - p_WB;
-    if (relevant_W.contains(point.p_W)) {
-      const double distance_m = offset.norm();
-      profile.closest_obstacle_m = std::fmin(profile.closest_obstacle_m, distance_m);
-      if (!(offset.dot(way) < kAhead * distance_m * way_m))
-        profile.obstacle_ahead_m = std::fmin(profile.obstacle_ahead_m, distance_m);
-    }
+    if (relevant_W.contains(point.p_W))
+      profile.closest_obstacle_m = std::fmin(profile.closest_obstacle_m, offset.norm());
     const double range_m = core::hypot2(offset.x(), offset.y());
     if (std::fabs(offset.z()) > config.height_band_m || range_m > config.gap_reach_m || !(range_m > 0.0))
       continue;
@@ -107,9 +100,9 @@ Status profile_space(const SpaceProfilerConfig& config, std::span<const CloudPoi
                      SpaceProfile& profile, core::StageBudget& budget, core::Work& work) noexcept {
   ROBORUN_ASSERT(config.validate() == Status::kOk);
   const PolledView view(map, budget, work);
-  const bool all = profile_points(config, points, p_WB, goal_W, relevant_W, budget, work, profile);
+  const bool all = profile_points(config, points, p_WB, relevant_W, budget, work, profile);
   if (!all) {
-    profile.closest_obstacle_m = profile.obstacle_ahead_m = 0.0;
+    profile.closest_obstacle_m = 0.0;
     profile.gap_average_m = config.vehicle_width_m;
   }
   profile.speed_mps = v_WB.norm();

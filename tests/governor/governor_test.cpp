@@ -127,29 +127,6 @@ TEST(Governor, TimeWinsOverPrecisionAtSpeed) {
   EXPECT_LT(seconds(d.point.deadline), 1.0);
 }
 
-TEST(Governor, SearchesLittleOnlyInTheOpen) {
-  Governor sut(paper_config(Design::kAware));
-  SpaceProfile p = open_space(25.0, 6.0);
-  const auto searched_m3 = [&](bool motion, bool straight) {
-    return sut.decide(p, {0, 100.0, false, motion, straight}).point.v2_m3;
-  };
-  for (int i = 0; i < 4; ++i) (void)searched_m3(false, true);
-  p.obstacle_ahead_m = kInfinity;
-  const double open_m3 = searched_m3(false, true);
-  EXPECT_LE(open_m3, 220.0);
-  EXPECT_GT(searched_m3(false, false), 10.0 * open_m3) << "the plan before had to turn, or ended soon";
-  EXPECT_TRUE(sut.decide(p, {0, 100.0, false, false, true}).open);
-  EXPECT_FALSE(sut.decide(p, {1, 100.0, false, false, true}).open) << "the decision before failed";
-  EXPECT_FALSE(sut.decide(p, {0, 100.0, false, true, true}).open) << "something moves";
-  const Nanos in_the_open = sut.decide(p, {0, 100.0, false, false, true}).point.deadline;
-  for (const double ahead_m : {20.0, 0.0, kNan}) {
-    p.obstacle_ahead_m = ahead_m;
-    EXPECT_GT(searched_m3(false, true), 10.0 * open_m3) << ahead_m;
-    EXPECT_EQ(sut.decide(p, {0, 100.0, false, false, true}).point.deadline, in_the_open)
-        << "the time for a search is kept in the open";
-  }
-}
-
 TEST(Governor, EveryInputHasAnAnswer) {
   Governor sut(paper_config(Design::kAware));
   SpaceProfile p = open_space(kNan, kNan);

@@ -92,7 +92,7 @@ fi
 printf '[world]\nbounds = [[0,0,0],[9,9,9]]\nstart = [1,1,1]\ngoal = [5,5,5]\nwalls = 3\n' >/tmp/roborun_bad.$$.toml
 refuses ":5: walls: unknown key" fly --world /tmp/roborun_bad.$$.toml
 printf '[camera]\npixels = 9999\n' >/tmp/roborun_bad.$$.toml
-refuses ":2: pixels: must be a number from 8 to 512" fly --settings /tmp/roborun_bad.$$.toml
+refuses ":2: pixels: must be a number from 8 to 1280" fly --settings /tmp/roborun_bad.$$.toml
 rm -f /tmp/roborun_cli_test.$$ /tmp/roborun_bad.$$.toml
 echo "$passed passed, $failed failed"
 [[ $failed -eq 0 && $passed -gt 15 ]]

@@ -200,7 +200,11 @@ TEST_F(Replay, RefusesAConfigurationThatNobodyWrote) {
     sitl::CameraRig rig(world_, config_.simulator, 1);
     sitl::SimulatedAircraft aircraft(config_.flight.vehicle, config_.simulator, ground_below(world_), 1,
                                      core::kMinorFrame, rig);
-    { FlightRecorder recorder(path, flight_config_of(world_, config), config, aircraft, rig.cameras()); }
+    flight::FlightConfig written = flight_config_of(world_, config_);
+    written.vehicle = config.flight.vehicle;
+    written.minor_frame = config.flight.minor_frame;
+    written.costs = config.flight.costs;
+    { FlightRecorder recorder(path, written, config, aircraft, rig.cameras()); }
     try {
       (void)replay_flight(path, {});
       FAIL() << wanted;

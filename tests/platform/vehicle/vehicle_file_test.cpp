@@ -90,11 +90,11 @@ TEST(VehicleFile, RefusesSensorsThatCannotBe) {
   EXPECT_NE(with("vertical_fov_deg = 58", "vertical_fov_deg = 0").find("vertical_fov_deg: must be"),
             std::string::npos);
   EXPECT_NE(with("range_m = 10", "range_m = nan").find("range_m: must be"), std::string::npos);
-  EXPECT_NE(with("range_min_m = 0.3", "range_min_m = 10").find("range_m: must be more than range_min_m"), std::string::npos);
+  EXPECT_NE(with("range_min_m = 0.3", "range_min_m = 10").find("range_m: must be more than range_min_m"),
+            std::string::npos);
   EXPECT_NE(with("rate_Hz = 30\n", "").find("rate_Hz: missing in [[camera]]"), std::string::npos);
   EXPECT_NE(with("x_m", "xx_m").find("xx_m: unknown key in [[camera]]"), std::string::npos);
-  EXPECT_NE(with("x_m = 0.12", "yaw_deg = 180").find("cannot see where it flies"),
-            std::string::npos);
+  EXPECT_NE(with("x_m = 0.12", "yaw_deg = 180").find("cannot see where it flies"), std::string::npos);
   std::string nine = paper;
   for (int i = 0; i < 9; ++i) nine += kCamera;
   EXPECT_NE(refusal(nine).find("camera: must be at most 8"), std::string::npos);

@@ -89,17 +89,5 @@ TEST_F(SpaceProfilerTest, MeasuresGapsAndTheClosestObstacleThatMatters) {
   EXPECT_NEAR(profile_.closest_obstacle_m, core::hypot2(8, 1.5), 1e-9);
 }
 
-TEST_F(SpaceProfilerTest, AheadIsWithin45DegreesOfTheWayToTheGoal) {
-  const Trajectory hold = Trajectory::hold(p_WB_, {});
-  points_ = {{Vector3(-4, 0, 5)}, {Vector3(8, 8.1, 5)}, {Vector3(8, 0, 0.2)}};
-  EXPECT_EQ(profile(Vector3::Zero(), hold).obstacle_ahead_m, kInfinity)
-      << "behind, aside, and where nobody flies";
-  EXPECT_NEAR(profile_.closest_obstacle_m, 4.0, 1e-9);
-  points_.push_back({Vector3(8, 7.9, 5)});
-  EXPECT_NEAR(profile(Vector3::Zero(), hold).obstacle_ahead_m, core::hypot2(8, 7.9), 1e-9);
-  goal_W_ = Vector3(-50, 0, 5);
-  EXPECT_NEAR(profile(Vector3(4, 0, 0), hold).obstacle_ahead_m, 4.0, 1e-9) << "whatever way it moves";
-}
-
 }  // namespace
 }  // namespace roborun::stages

@@ -1,0 +1,57 @@
+/// Every shipped vehicle flies a mission, and keeps as near to its reference as its file says.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <string>
+
+#include "platform/board/board_profile.hpp"
+#include "platform/mission/mission.hpp"
+#include "platform/sitl/world/world_file.hpp"
+#include "platform/vehicle/vehicle_file.hpp"
+
+namespace roborun::mission {
+namespace {
+
+class ShippedVehicle : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(ShippedVehicle, FliesPastTwoPillarsAndKeepsNearItsReference) {
+  const sitl::World world =
+      sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {});
+  const vehicle::Vehicle vehicle = vehicle::load_vehicle(GetParam());
+  MissionConfig config;
+  set_vehicle(config, vehicle);
+  // A board on which a decision takes 0.1 s instead of 0.7 s; images that a test can afford to cast.
+  const board::Profile paper = board::paper();
+  config.flight.costs = paper.costs;
+  config.flight.model = paper.model;
+  for (core::StageCost& cost : config.flight.costs.stage) cost = core::slower(cost, 0.15);
+  for (governor::LatencyModel& model : config.flight.model) {
+    for (double& fixed_s : model.fixed_s) fixed_s *= 0.15;
+    for (double& slope_s_per_m3 : model.slope_s_per_m3) slope_s_per_m3 *= 0.15;
+  }
+  for (CameraSpec& camera : config.simulator.rig->cameras) {
+    while (camera.width > 200) {
+      camera.width /= 2;
+      camera.height /= 2;
+    }
+  }
+  config.judge.time_limit_s = 300.0;
+  double error_m = 0.0;
+  config.each_frame = [&error_m](const FrameRecord& f) {
+    if (f.airborne) error_m = std::max(error_m, (f.truth.p_WB - f.committed.at(f.now).p_W).norm());
+  };
+  const report::MissionResult r = fly_mission(world, config, {}).result;
+  std::printf("%s: %s after %.0f s, %.1f m, mean %.2f m/s, at most %.2f m/s, tracking error at most %.2f m\n",
+              GetParam().c_str(), r.reason.c_str(), r.mission_time_s, r.distance_m, r.mean_velocity_mps,
+              r.max_velocity_mps, error_m);
+  EXPECT_FALSE(r.collided);
+  EXPECT_GT(r.distance_m, 10.0) << "it did not fly";
+  EXPECT_LE(error_m, vehicle.model.tracking_error_m);
+  EXPECT_LE(r.max_velocity_mps, 1.15 * vehicle.model.speed_mps);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ShippedVehicle, ::testing::ValuesIn(vehicle::shipped_vehicles()),
+                         [](const auto& p) { return p.param; });
+
+}  // namespace
+}  // namespace roborun::mission
