@@ -127,7 +127,8 @@ bool cameras_see_all_around(const SensorRig& rig) noexcept {
     const firmware_if::CameraMount mount = camera_mount(camera.mount);
     const Matrix3 R_BC = Eigen::Map<const RowMajor3>(mount.R_BC.data());
     for (int i = 0; i < 4 * kSteps; ++i) {
-      const double along = 2.0 * (i / 4 + 0.5) / kSteps - 1.0;
+      const int step = i / 4;
+      const double along = 2.0 * (step + 0.5) / kSteps - 1.0;
       const double side = (i & 1) != 0 ? 1.0 + kOutside : -1.0 - kOutside;
       const double y = (i & 2) != 0 ? along : side;
       const double z = (i & 2) != 0 ? side : along;

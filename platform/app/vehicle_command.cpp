@@ -29,10 +29,10 @@ struct Consequences {
   std::array<std::array<double, 2>, 4> stop{};  ///< Speed, distance.
   double range_m{};                             ///< Of its sensors, the shortest.
   double blind_deg{};                           ///< Widest angle to the nearest direction that is seen.
-  bool looks_forward{};
-  double fastest_mps{};  ///< That can stop within what is seen, thinking for 0.2 s.
-  double gap_m{};        ///< The narrowest that plans go through.
-  std::size_t bytes{};   ///< In a world of 100 x 100 x 10 m.
+  double fastest_mps{};                         ///< That can stop within what is seen, thinking for 0.2 s.
+  Vector3 assumed_half_m = Vector3::Zero();     ///< flight::assumed_free_half_m().
+  double gap_m{};                               ///< The narrowest that plans go through.
+  std::size_t bytes{};                          ///< In a world of 100 x 100 x 10 m.
 };
 
 Consequences consequences_of(const vehicle::Vehicle& vehicle) {
@@ -54,7 +54,8 @@ Consequences consequences_of(const vehicle::Vehicle& vehicle) {
   describe_sensors(rig, config.flight);
   c.range_m = config.flight.camera_range_m;
   c.blind_deg = widest_blind_angle_rad(rig) * 180.0 / core::kPi;
-  c.looks_forward = looks_forward(rig);
+  c.assumed_half_m =
+      flight::assumed_free_half_m(v, config.flight.sees_all_around, config.flight.level_view_ratio);
   governor::GovernorConfig g;
   g.stopping = stop;
   constexpr double kThinking_s = 0.2;
@@ -72,11 +73,15 @@ std::vector<std::string> shortcomings_of(const vehicle::Vehicle& vehicle, const 
   if (c.fastest_mps < v.speed_mps)
     lines.push_back(
         fmt::format("cannot use its {:.1f} m/s: what it sees allows {:.1f} m/s", v.speed_mps, c.fastest_mps));
-  if (!c.looks_forward)
-    lines.emplace_back("cannot see where it flies: nothing looks within 45 degrees of forward");
   if (c.thrust_to_weight_ratio < 1.6)
     lines.push_back(
         fmt::format("has little thrust for wind: thrust-to-weight {:.2f}", c.thrust_to_weight_ratio));
+  if (!c.assumed_half_m.isZero(0.0))
+    lines.push_back(
+        fmt::format("cannot see all around: take off where {:.1f} m to all sides and {:.1f} m above and "
+                    "below the top of the climb are "
+                    "free",
+                    c.assumed_half_m.x(), c.assumed_half_m.z()));
   lines.push_back(fmt::format("cannot pass gaps narrower than {:.2f} m", c.gap_m));
   return lines;
 }

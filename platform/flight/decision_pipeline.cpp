@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/memory/static_vector.hpp"
+#include "platform/flight/flight_config.hpp"
 #include "stages/perception/polled_view.hpp"
 #include "stages/planning/fenced_view.hpp"
 
@@ -26,6 +27,17 @@ double arrival_s(const Trajectory& trajectory, const DecisionInput& in) noexcept
 }
 
 }  // namespace
+
+Vector3 assumed_free_half_m(const VehicleModel& vehicle, bool sees_all_around,
+                            double level_view_ratio) noexcept {
+  constexpr double kMost_m = 5.0;
+  if (sees_all_around) return Vector3::Zero();
+  // What has to be free around the start of a plan, and as far as the sensors see less of it than that while the
+  // vehicle turns: at a distance of d they see d * ratio up and down.
+  const double half_m = planned_radius_m(vehicle) + kCornerRoom_m + kFinestCell_m;
+  const double reach_m = std::min((half_m + kFinestCell_m) / level_view_ratio + kFinestCell_m, kMost_m);
+  return {std::max(reach_m, half_m), std::max(reach_m, half_m), half_m};
+}
 
 DecisionPipeline::DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter,
                                    governor::DecisionPolicy& policy, stages::PointCloud& cloud,
@@ -85,18 +97,12 @@ void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noex
 }
 
 Vector3 DecisionPipeline::assumed_half_m(const DecisionInput& in) const noexcept {
-  constexpr double kMost_m = 5.0;
   const MonotonicTime climbed = in.committed->start_time + from_seconds(in.committed->duration_s());
   // Decisions that are long may all begin before or after the short hover of the climb: until there is a plan,
   // the vehicle hovers where the climb ended.
   const bool hovers = in.now >= climbed && (in.climbing || !has_planned_);
-  if (config_.sees_all_around || !hovers) return Vector3::Zero();
-  // What has to be free around the start of a plan, and as far as the sensors see less of it than that while the
-  // vehicle turns: at a distance of d they see d * ratio up and down.
-  const double half_m = radius_m() + kCornerRoom_m + kFinestCell_m;
-  const double reach_m =
-      std::min((half_m + kFinestCell_m) / config_.level_view_ratio + kFinestCell_m, kMost_m);
-  return {std::max(reach_m, half_m), std::max(reach_m, half_m), half_m};
+  if (!hovers) return Vector3::Zero();
+  return assumed_free_half_m(config_.vehicle, config_.sees_all_around, config_.level_view_ratio);
 }
 
 void DecisionPipeline::integrate(const DecisionInput& in, DecisionOutput& out) noexcept {

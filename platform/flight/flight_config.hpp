@@ -50,4 +50,10 @@ struct FlightConfig {
 /// What a rig says of a flight: range, what is seen, the size of clouds.
 void describe_sensors(const SensorRig& rig, FlightConfig& config) noexcept;
 
+/// Half the sides of the box around the top of the climb that counts as free although no sensor has seen it: what a
+/// vehicle whose sensors leave gaps needs to begin. Zero where they see all around. Whoever starts it sees to it that
+/// this much space is free there. `level_view_ratio` as of FlightConfig.
+[[nodiscard]] Vector3 assumed_free_half_m(const VehicleModel& vehicle, bool sees_all_around,
+                                          double level_view_ratio) noexcept;
+
 }  // namespace roborun::flight

@@ -72,7 +72,7 @@ core::Fence read_fence(const Json& json) {
 }
 
 Vector3 place(const Json& json, const char* key) {
-  const Vector3 p_W = vector(json, key);
+  Vector3 p_W = vector(json, key);
   if (!is_finite(p_W) || p_W.cwiseAbs().maxCoeff() > kFarthest_m)
     throw InputError(fmt::format("{}: not within {} m", key, kFarthest_m));
   return p_W;

@@ -204,12 +204,16 @@ ReplayResult replay_flight(const std::string& path, const std::function<void(dou
   ReplayedAircraft aircraft(recording, digest);
   const RecordedFlight& recorded = recording.flight();
   std::vector<ReplayedCamera> camera;
+  camera.reserve(recorded.mounts.size());
   for (std::uint32_t i = 0; i < recorded.mounts.size(); ++i) camera.emplace_back(recording, i);
   std::vector<firmware_if::DepthCamera*> cameras;
+  cameras.reserve(camera.size());
   for (ReplayedCamera& c : camera) cameras.push_back(&c);
   std::vector<ReplayedLidar> lidar;
+  lidar.reserve(recorded.lidar_mounts.size());
   for (std::uint32_t i = 0; i < recorded.lidar_mounts.size(); ++i) lidar.emplace_back(recording, i);
   std::vector<firmware_if::Lidar*> lidars;
+  lidars.reserve(lidar.size());
   for (ReplayedLidar& l : lidar) lidars.push_back(&l);
   FlightSetup setup(recorded.flight, recorded.backends,
                     board::image_limits(recorded.sensors, recorded.flight.vehicle));

@@ -186,6 +186,7 @@ void read_settings(const input::TomlReader& reader, const toml::table& root, Mis
 
 std::vector<input::KeyText> settings_keys() {
   std::vector<input::KeyText> keys;
+  keys.reserve(kSettings.size());
   const MissionConfig defaults;
   for (const SettingKey& key : kSettings)
     keys.push_back({key.table, key.key, key.low, key.high, key.get(defaults), key.text});

@@ -50,7 +50,7 @@ std::string LaneSet::start() {
     // the flight lane's releases, so that it waits for nobody's where CPUs are shared.
     const bool is_flight = core::kLanes[i].id == core::LaneId::kFlight;
     lane_[i].start(is_flight ? first_ : first_ + config_.minor_frame / 2, config_.minor_frame);
-    if (const std::string error = thread_[i].start(placement_[i], true); !error.empty()) return error;
+    if (std::string error = thread_[i].start(placement_[i], true); !error.empty()) return error;
   }
   return {};
 }

@@ -165,6 +165,7 @@ Vehicle vehicle_from_toml(const std::string& path, const std::string& text) {
 
 std::vector<std::string> shipped_vehicles() {
   std::vector<std::string> names;
+  names.reserve(kShippedVehicles.size());
   for (const ShippedVehicle& v : kShippedVehicles) names.emplace_back(v.name);
   return names;
 }
@@ -180,6 +181,7 @@ Vehicle load_vehicle(const std::string& name_or_path) {
 
 std::vector<input::KeyText> vehicle_keys() {
   std::vector<input::KeyText> keys;
+  keys.reserve(kVehicleKeys.size() + kCameraKeys.size() + kLidarKeys.size());
   const VehicleModel defaults;
   for (const VehicleKey& key : kVehicleKeys)
     keys.push_back({key.table, key.key, key.low, key.high, defaults.*key.value, key.text});

@@ -57,5 +57,9 @@ inline constexpr std::array<std::uint16_t, 16> kMortonSpread{0x000, 0x001, 0x008
          (static_cast<std::uint32_t>(kMortonSpread[y & 15U]) << 1U) |
          (static_cast<std::uint32_t>(kMortonSpread[z & 15U]) << 2U);
 }
+/// A cell's number along one axis inside its brick. RT-safe: O(1).
+[[nodiscard]] constexpr std::uint32_t in_brick(std::int32_t cell) noexcept {
+  return static_cast<std::uint32_t>(cell & (kBrickCells - 1));
+}
 
 }  // namespace roborun::stages

@@ -29,10 +29,6 @@ std::size_t position_count(const Aabb& bounds_W) noexcept {
          static_cast<std::size_t>(even_bricks(size.z()));
 }
 
-std::uint32_t in_brick(std::int32_t cell) noexcept {
-  return static_cast<std::uint32_t>(cell & (kBrickCells - 1));
-}
-
 }  // namespace
 
 Status BrickMap::Config::validate() const noexcept {

@@ -15,10 +15,6 @@ constexpr int kTileLevel = 2;  // where a tile may end is known in cells of this
 constexpr double kTileCell_m = cell_size_m(kTileLevel);
 constexpr std::int32_t kTileCells = 1 << (kBrickLevel - kTileLevel);  // of a brick's edge
 
-std::uint32_t in_brick(std::int32_t cell) noexcept {
-  return static_cast<std::uint32_t>(cell & (kBrickCells - 1));
-}
-
 /// Tiles of at most half the image that a cell of p0 has at the end of the range.
 int tile_shift(const firmware_if::DepthFrame& frame, int level) noexcept {
   const double half_cell_m = 0.5 * cell_size_m(std::clamp(level, 0, kPrecisionLevels - 1));
