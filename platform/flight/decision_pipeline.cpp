@@ -11,7 +11,6 @@
 namespace roborun::flight {
 namespace {
 
-constexpr std::size_t index(core::StageId id) noexcept { return static_cast<std::size_t>(id); }
 constexpr double kTrajectoryStep_s = 0.5;  // of the points that order the space by distance
 constexpr std::size_t kTrajectoryPoints = 32;
 constexpr double kCornerRoom_m = 0.25;
@@ -55,14 +54,14 @@ DecisionPipeline::DecisionPipeline(const PipelineConfig& config, core::StageMete
 
 void DecisionPipeline::charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept {
   meter_.charge_to(id);
-  out.work[index(id)] = work;
-  out.cost[index(id)] = meter_.settle(id, work);
-  out.latency += out.cost[index(id)];
+  out.work[id] = work;
+  out.cost[id] = meter_.settle(id, work);
+  out.latency += out.cost[id];
 }
 
 core::MeteredBudget DecisionPipeline::budget_of(core::StageId id, const DecisionOutput& out) noexcept {
   Nanos rest = out.decision.point.deadline - out.latency;
-  for (std::size_t later = index(id) + 1; later < core::kStageCount; ++later)
+  for (std::size_t later = static_cast<std::size_t>(id) + 1; later < core::kStageCount; ++later)
     rest -= from_seconds(out.decision.predicted_s[later]);
   return {meter_, id, meter_.grant(id, rest)};
 }
@@ -92,8 +91,7 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
 void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noexcept {
   out.decision =
       policy_.decide(out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing, out.motion});
-  if (out.decision.predicted_s[index(core::StageId::kGovernor)] > 0.0)
-    charge(core::StageId::kGovernor, {}, out);
+  if (out.decision.predicted_s[core::StageId::kGovernor] > 0.0) charge(core::StageId::kGovernor, {}, out);
 }
 
 Vector3 DecisionPipeline::assumed_half_m(const DecisionInput& in) const noexcept {
@@ -145,7 +143,7 @@ void DecisionPipeline::check_committed(const DecisionInput& in, DecisionOutput& 
   const stages::FinestView known(config_.fence.empty() ? map_.view() : fenced);
   meter_.charge_to(core::StageId::kPlanner);
   core::MeteredBudget budget = budget_of(core::StageId::kPlanner, out);
-  core::Work& work = out.work[index(core::StageId::kPlanner)];
+  core::Work& work = out.work[core::StageId::kPlanner];
   const stages::PolledView polled(known, budget, work);
   const double from_s = seconds(in.now - in.committed->start_time);
   const double until_s = free_until_s(polled, *in.committed, from_s, config_.vehicle.radius_m, work.units);
@@ -223,7 +221,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   if (in.climbing && draft_.takes_over < ends) return;
   draft_.begun = true;
   draft_.start = in.committed->at(draft_.takes_over);
-  draft_.planner_work = out.work[index(core::StageId::kPlanner)];
+  draft_.planner_work = out.work[core::StageId::kPlanner];
   draft_.smoother_work = {};
   const stages::FencedView fenced(map_.view(), config_.fence);
   const stages::FinestView known(config_.fence.empty() ? map_.view() : fenced);

@@ -71,8 +71,8 @@ struct DecisionOutput {
   Status smoother_status{Status::kNotReady};
   SpaceProfile profile{};
   governor::Decision decision{};
-  std::array<core::Work, core::kStageCount> work{};
-  std::array<Nanos, core::kStageCount> cost{};
+  core::StageArray<core::Work> work{};
+  core::StageArray<Nanos> cost{};
   bool motion{};    ///< Something was seen to move nearby, not long ago.
   Nanos latency{};  ///< Sum of the costs: when the result is there, counted from input.now.
 };

@@ -11,6 +11,7 @@
 #include "core/geometry/vector.hpp"
 #include "core/sensor_rig.hpp"
 #include "core/vehicle_model.hpp"
+#include "firmware_if/status.hpp"
 #include "firmware_if/time.hpp"
 #include "governor/policy/governor.hpp"
 
@@ -43,6 +44,7 @@ struct FlightConfig {
   std::uint64_t seed{1};                                ///< Of the planner's random numbers.
   Nanos minor_frame{core::kMinorFrame};                 ///< core::minor_frame_of() a legal rate.
   bool answers{true};  ///< False: the failsafe sees and records, and does nothing. For tests alone.
+  [[nodiscard]] Status validate() const noexcept;
 };
 
 /// What the map has to hold: the flight's bounds and a margin in which surfaces are of interest.

@@ -1,6 +1,10 @@
 #include "platform/flight/flight_system.hpp"
 
 #include <algorithm>
+#include <cmath>
+
+#include "core/range.hpp"
+#include "firmware_if/assert.hpp"
 
 namespace roborun::flight {
 namespace {
@@ -20,7 +24,28 @@ PipelineConfig pipeline_config(const FlightConfig& config) noexcept {
   return pipeline;
 }
 
+/// No faster than the vehicle turns.
+GazeConfig gaze_of(const FlightConfig& config) noexcept {
+  GazeConfig gaze = config.gaze;
+  gaze.yaw_rate_radps = std::min(gaze.yaw_rate_radps, config.vehicle.yaw_rate_radps);
+  return gaze;
+}
+
 }  // namespace
+
+Status FlightConfig::validate() const noexcept {
+  const std::int64_t frame_ns = minor_frame.count();
+  const bool rate_ok = frame_ns > 0 && core::is_flight_rate(static_cast<int>(1'000'000'000 / frame_ns));
+  const bool space_ok = is_finite(bounds_W.min_W) && is_finite(bounds_W.max_W) &&
+                        bounds_W.size().minCoeff() > 0.0 && is_finite(goal_W) && std::isfinite(cruise_m);
+  const bool sensors_ok = core::above(camera_range_m, 1.0, 200.0) &&
+                          core::above(level_view_ratio, 0.0, 100.0) &&
+                          core::above(gaze.yaw_rate_radps, 0.0, 3.0) &&
+                          core::above(gaze.stuck_s, 0.0, 1000.0) && core::within(gaze.lead_s, 0.0, 10.0);
+  const bool ok = out_of_bounds(vehicle) == nullptr && rate_ok && space_ok && sensors_ok &&
+                  costs.validate() == Status::kOk;
+  return ok ? Status::kOk : Status::kInvalidArgument;
+}
 
 governor::GovernorConfig governor_config(const FlightConfig& config) noexcept {
   const auto cost_of = [&config](core::StageId id) { return seconds(config.costs.cost(id, {})); };
@@ -65,12 +90,12 @@ std::size_t FlightSystem::arena_bytes(const FlightConfig& config) noexcept {
 FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, Aircraft& aircraft,
                            std::span<firmware_if::DepthCamera* const> cameras, const FlightParts& parts,
                            core::Arena& arena, std::span<firmware_if::Lidar* const> lidars) noexcept
-    : map_(parts.map),
+    : map_((ROBORUN_ASSERT(config.validate() == Status::kOk), parts.map)),
       cloud_({}, arena),
       governor_(governor_config(config)),
       policy_(parts.policy != nullptr ? *parts.policy : governor_),
       pipeline_(pipeline_config(config), meter, policy_, cloud_, parts.map, parts.planner, smoother_),
-      control_(config.vehicle, seconds(config.minor_frame), config.gaze),
+      control_(config.vehicle, seconds(config.minor_frame), gaze_of(config)),
       flight_program_({config.vehicle, config.fence, config.answers}, control_, aircraft, mail_),
       decision_program_({config.goal_W, config.seed, config.fence, config.minor_frame}, pipeline_, cameras,
                         mail_, lidars, config.cloud_pixels, arena) {

@@ -29,7 +29,7 @@ struct FlightParts {
 /// About 200 kB, without the memory in the arena: not for a small stack.
 class FlightSystem {
  public:
-  /// Takes arena_bytes() from the arena: look at arena.exhausted() before the lanes start. At most
+  /// Precondition, asserted: config.validate() is kOk. Takes arena_bytes() from the arena: look at arena.exhausted() before the lanes start. At most
   /// kMostCameras cameras and kMostLidars LiDARs; all references outlive the system.
   FlightSystem(const FlightConfig& config, core::StageMeter& meter, Aircraft& aircraft,
                std::span<firmware_if::DepthCamera* const> cameras, const FlightParts& parts,

@@ -122,9 +122,9 @@ void MissionRun::record_decision(const flight::DecisionOutput& out) {
   r.speed_mps = aircraft_.vehicle().state().v_WB.norm();
   r.p0_m = cell_size_m(point.p0_level);
   r.p1_m = cell_size_m(point.p1_level);
-  r.v0_m3 = out.work[static_cast<std::size_t>(core::StageId::kMap)].volume_m3;
-  r.v1_m3 = out.work[static_cast<std::size_t>(core::StageId::kExport)].volume_m3;
-  r.v2_m3 = out.work[static_cast<std::size_t>(core::StageId::kPlanner)].volume_m3;
+  r.v0_m3 = out.work[core::StageId::kMap].volume_m3;
+  r.v1_m3 = out.work[core::StageId::kExport].volume_m3;
+  r.v2_m3 = out.work[core::StageId::kPlanner].volume_m3;
   r.time_budget_s = seconds(out.decision.time_budget);
   r.budget_source = governor::to_string(out.decision.source);
   r.deadline_s = seconds(point.deadline);

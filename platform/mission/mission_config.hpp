@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,7 +36,8 @@ struct TimedFault {
 
 /// A processor that is throttled in flight.
 struct SlowDown {
-  double at_s{1e300};  ///< From then on computing takes `factor` times as long.
+  /// From then on computing takes `factor` times as long; +infinity: never.
+  double at_s{std::numeric_limits<double>::infinity()};
   double factor{1.0};
   [[nodiscard]] double slower(MonotonicTime now) const noexcept {
     return seconds(now.time_since_epoch()) >= at_s ? factor : 1.0;

@@ -1,6 +1,8 @@
 /// Judges a simulated mission by the true world: collisions, safety, and when and why it ends.
 #pragma once
 
+#include <limits>
+
 #include "core/geometry/fence.hpp"
 #include "platform/flight/flight_system.hpp"
 #include "platform/mission/mission_config.hpp"
@@ -44,7 +46,7 @@ class MissionJudge {
   bool collided_{false};
   bool left_ground_{false};
   double sink_mps_{0.0};
-  double best_distance_m_{1e300};
+  double best_distance_m_{std::numeric_limits<double>::infinity()};
   MonotonicTime best_at_{};
 };
 

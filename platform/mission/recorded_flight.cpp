@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "platform/input/input_error.hpp"
@@ -158,8 +159,10 @@ std::string to_json(const RecordedFlight& recorded) {
   j["lidars"] = sensors_json(recorded.sensors.lidars);
   const flight::GazeConfig& gaze = flight.gaze;
   j["gaze"] = {{"yaw_rate_radps", gaze.yaw_rate_radps}, {"stuck_s", gaze.stuck_s}, {"lead_s", gaze.lead_s}};
-  j["slow_down_at_s"] = recorded.slow_down.at_s;
-  j["slow_down_factor"] = recorded.slow_down.factor;
+  if (std::isfinite(recorded.slow_down.at_s)) {
+    j["slow_down_at_s"] = recorded.slow_down.at_s;
+    j["slow_down_factor"] = recorded.slow_down.factor;
+  }
   j["answers"] = flight.answers;
   j["fence"] = fence_json(flight.fence);
   j["mounts"] = mounts_json(recorded.mounts);
@@ -200,7 +203,8 @@ RecordedFlight recorded_flight_from(std::span<const std::byte> json) {
   flight.gaze.yaw_rate_radps = number(gaze, "yaw_rate_radps", 0.01, 3);
   flight.gaze.stuck_s = number(gaze, "stuck_s", 0, 1e6);
   flight.gaze.lead_s = number(gaze, "lead_s", 0, 100);
-  recorded.slow_down = {number(j, "slow_down_at_s", 0, 1e300), number(j, "slow_down_factor", 0.001, 1000)};
+  if (j.contains("slow_down_at_s"))
+    recorded.slow_down = {number(j, "slow_down_at_s", 0, 1e6), number(j, "slow_down_factor", 0.001, 1000)};
   flight.answers = j.at("answers").get<bool>();
   flight.fence = read_fence(j.at("fence"));
   recorded.mounts = read_mounts(j, "mounts", recorded.sensors.cameras.size());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "platform/report/svg.hpp"
 
@@ -13,7 +14,7 @@ constexpr double kPanelHeight = 360.0;
 constexpr double kMargin = 62.0;
 
 struct Axis {
-  double low{1e300};
+  double low{std::numeric_limits<double>::infinity()};
   double high{0.0};
   void cover(double x) {
     if (!(x > 0.0)) return;

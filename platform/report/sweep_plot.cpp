@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "platform/report/svg.hpp"
@@ -152,7 +153,7 @@ std::vector<std::string> designs_of(const std::vector<SweepRow>& rows, const std
 void draw_sensitivity(Svg& svg, const std::vector<SweepRow>& rows, const std::string& profile,
                       const Knob& knob, const Metric& metric, double left, double top) {
   const std::vector<std::string> designs = designs_of(rows, profile);
-  double low = 1e300;
+  double low = std::numeric_limits<double>::infinity();
   double high = 0.0;
   std::set<double> knobs;
   for (const std::string& design : designs) {

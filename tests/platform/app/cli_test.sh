@@ -76,6 +76,33 @@ refuses "cannot be opened" scenario run nope.toml
 refuses "must hold .toml files" scenario run "$data"
 refuses "unknown key in the file" scenario run "$data/worlds"
 refuses "whole number from 1 to 1024" scenario run "$data" --jobs 0
+for command in fly audit memory sweep; do
+  refuses "a vehicle file, or one of paper, x500, mighty, racer, micro" "$command" --vehicle nope.toml
+done
+refuses "a vehicle file, or one of paper, x500, mighty, racer, micro" vehicle check nope
+# Vehicles that cannot be: each is the shipped one with one thing changed.
+vehicle() {
+  sed "$2" "$(dirname "$0")/../../../platform/vehicle/x500.toml" >/tmp/roborun_vehicle.$$.toml
+  refuses "$1" vehicle check /tmp/roborun_vehicle.$$.toml
+  refuses "$1" fly --vehicle /tmp/roborun_vehicle.$$.toml
+}
+vehicle "cannot hover" 's/^max_thrust_N = .*/max_thrust_N = 5/'
+vehicle ": mass_kg: must be a number from 0.05 to 100" 's/^mass_kg = .*/mass_kg = nan/'
+vehicle ": radius_m: must be a number from 0.05 to 2" 's/^radius_m = .*/radius_m = -1/'
+vehicle ": battery_J: must be a number from 1000 to 1000000000" 's/^battery_J = .*/battery_J = 1e30/'
+vehicle "cannot stop within what it sees" 's/^range_m = .*/range_m = 1/; s/^tracking_error_m = .*/tracking_error_m = 1/'
+vehicle "must look within 45 degrees of forward" 's/^x_m = .*/yaw_deg = 180/'
+vehicle ": width: must be a whole number" 's/^width = .*/width = 96.5/'
+vehicle ": mass_kg: missing in [body]" 's/^mass_kg = .*//'
+vehicle "drak: unknown key" 's/^.drag.$/[drak]/'
+rm -f /tmp/roborun_vehicle.$$.toml
+# What the program says of its keys is what the documents say.
+if "$roborun" config | cmp -s - <(sed -n '/^```text$/,/^```$/p' "$(dirname "$0")/../../../platform/CONFIG.md" | sed '1d;$d'); then
+  passed=$((passed + 1))
+else
+  echo "FAILED platform/CONFIG.md is not what 'roborun config' says"
+  failed=$((failed + 1))
+fi
 # Without privileges real time is refused by name, and only --best-effort runs on. Not under an emulator, behind whose script
 # the host would be measured for minutes first.
 if [[ $(id -u) -eq 0 && $(head -c 2 "$roborun" | tr -d '\0') != '#!' ]] && command -v setpriv >/dev/null && [[ $(ulimit -r) -eq 0 ]]; then
