@@ -3,7 +3,6 @@
 #include <cmath>
 #include <limits>
 
-#include "core/geometry/camera_pose.hpp"
 #include "core/random/counter_rng.hpp"
 
 namespace roborun::sitl {
@@ -21,7 +20,12 @@ CameraSpec DepthCameraConfig::spec() const noexcept {
 SimulatedDepthCamera::SimulatedDepthCamera(const World& world, const CameraSpec& spec,
                                            const firmware_if::CameraMount& mount, const DepthNoise& noise,
                                            std::uint64_t seed, std::uint32_t camera)
-    : world_(world), spec_(spec), noise_(noise), mount_(mount), seed_(seed), camera_(camera) {
+    : world_(world),
+      spec_(spec),
+      noise_(noise),
+      seed_(seed),
+      camera_(camera),
+      exposures_({spec.rate_Hz, spec.latency_s, noise.frame_dropout_ratio, seed, 0x1000U + camera}, mount) {
   const std::size_t width = spec.width, height = spec.height;
   image_.resize(width * height);
   ray_C_.reserve(width * height);
@@ -36,59 +40,35 @@ SimulatedDepthCamera::SimulatedDepthCamera(const World& world, const CameraSpec&
   }
 }
 
-void SimulatedDepthCamera::expose(MonotonicTime now, const Pose& X_WB) noexcept {
-  now_ = now;
-  if (now < next_) return;
-  next_ = now + from_seconds(1.0 / spec_.rate_Hz);
-  ++taken_;
-  Exposure& e = ring_[taken_ % ring_.size()];
-  e.stamp = now;
-  e.sequence = taken_;
-  e.X_WC = core::camera_pose(X_WB, mount_);
-  core::CounterRng rng(seed_, 0x1000U + camera_);
-  rng.seek(std::uint64_t{taken_});
-  e.lost = rng.uniform() < noise_.frame_dropout_ratio;
-}
-
 Status SimulatedDepthCamera::read(firmware_if::DepthFrame& frame) noexcept {
-  const Nanos latency = from_seconds(spec_.latency_s);
-  for (std::uint32_t sequence = taken_; sequence > last_read_ && taken_ - sequence < ring_.size();
-       --sequence) {
-    const Exposure& e = ring_[sequence % ring_.size()];
-    if (e.lost || e.stamp + latency > now_) continue;
-    render(e);
-    last_read_ = sequence;
-    frame = {e.stamp,
-             e.sequence,
-             spec_.width,
-             spec_.height,
-             static_cast<float>(spec_.tan_half_width),
-             static_cast<float>(spec_.tan_half_height),
-             static_cast<float>(spec_.range_m),
-             static_cast<float>(spec_.range_min_m),
-             image_};
-    return Status::kOk;
-  }
-  return Status::kNotReady;
+  const Exposure* e = exposures_.take();
+  if (e == nullptr) return Status::kNotReady;
+  render(*e);
+  frame = {e->stamp,
+           e->sequence,
+           spec_.width,
+           spec_.height,
+           static_cast<float>(spec_.tan_half_width),
+           static_cast<float>(spec_.tan_half_height),
+           static_cast<float>(spec_.range_m),
+           static_cast<float>(spec_.range_min_m),
+           image_};
+  return Status::kOk;
 }
 
 void SimulatedDepthCamera::render(const Exposure& e) noexcept {
   core::CounterRng rng(seed_, (std::uint64_t{camera_} << 40U) + e.sequence);
-  const Vector3 origin_W = e.X_WC.p_RT;
+  const Vector3 origin_W = e.X_WS.p_RT;
   for (std::size_t i = 0; i < ray_C_.size(); ++i) {
     const double length = ray_C_[i].norm();
-    const Vector3 direction_W = (e.X_WC.R_RT * ray_C_[i]) / length;
+    const Vector3 direction_W = (e.X_WS.R_RT * ray_C_[i]) / length;
     double depth_m = world_.hit_distance_m(origin_W, direction_W, spec_.range_m * length, e.stamp) / length;
     const std::uint64_t bits = rng.next();
     if (static_cast<double>(bits >> 40U) * 0x1.0p-24 < noise_.pixel_dropout_ratio) {
       depth_m = std::numeric_limits<double>::quiet_NaN();
     } else if (depth_m < std::numeric_limits<double>::infinity()) {
-      // Sum of four 10-bit uniforms: near enough to a Gaussian, and bounded, as a matcher's error is.
-      const double sum = static_cast<double>((bits & 1023U) + ((bits >> 10U) & 1023U) +
-                                             ((bits >> 20U) & 1023U) + ((bits >> 30U) & 1023U));
-      const double standard = (sum - 2046.0) / 591.2;
-      depth_m =
-          std::fmax(0.01, depth_m + standard * (noise_.noise_m + noise_.noise_per_m * depth_m * depth_m));
+      depth_m = std::fmax(
+          0.01, depth_m + bounded_normal(bits) * (noise_.noise_m + noise_.noise_per_m * depth_m * depth_m));
     }
     if (depth_m <= spec_.range_min_m) depth_m = std::numeric_limits<double>::quiet_NaN();
     image_[i] = static_cast<float>(depth_m);

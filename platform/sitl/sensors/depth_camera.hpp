@@ -9,6 +9,7 @@
 #include "core/geometry/vector.hpp"
 #include "core/sensor_rig.hpp"
 #include "firmware_if/depth_camera.hpp"
+#include "platform/sitl/sensors/exposures.hpp"
 #include "platform/sitl/world/world.hpp"
 
 namespace roborun::sitl {
@@ -45,32 +46,21 @@ class SimulatedDepthCamera final : public firmware_if::DepthCamera {
       : SimulatedDepthCamera(world, config.spec(), mount, config, seed, camera) {}
 
   /// To be called at every minor frame with the true pose; takes an exposure when one is due.
-  void expose(MonotonicTime now, const Pose& X_WB) noexcept;
+  void expose(MonotonicTime now, const Pose& X_WB) noexcept { exposures_.expose(now, X_WB); }
   [[nodiscard]] Status read(firmware_if::DepthFrame& frame) noexcept override;
-  [[nodiscard]] const firmware_if::CameraMount& mount() const noexcept override { return mount_; }
+  [[nodiscard]] const firmware_if::CameraMount& mount() const noexcept override { return exposures_.mount(); }
 
  private:
-  struct Exposure {
-    MonotonicTime stamp{};
-    std::uint32_t sequence{};
-    Pose X_WC{};
-    bool lost{};
-  };
   void render(const Exposure& exposure) noexcept;
 
   const World& world_;
   CameraSpec spec_;
   DepthNoise noise_;
-  firmware_if::CameraMount mount_;
   std::uint64_t seed_;
   std::uint32_t camera_;
   std::vector<Vector3> ray_C_;  ///< Per pixel, x component 1.
   std::vector<float> image_;
-  std::array<Exposure, 32> ring_{};
-  std::uint32_t taken_{0};
-  std::uint32_t last_read_{0};  ///< Sequence of the newest frame handed out, 0: none.
-  MonotonicTime now_{};
-  MonotonicTime next_{};
+  Exposures exposures_;
 };
 
 /// Forward, left, back, right, up, down: together they see the whole sphere.

@@ -7,7 +7,6 @@
 #include <limits>
 #include <sstream>
 
-#include "core/geometry/camera_pose.hpp"
 #include "core/random/counter_rng.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
@@ -74,9 +73,10 @@ SimulatedLidar::SimulatedLidar(const World& world, const LidarSpec& spec,
     : world_(world),
       spec_(spec),
       noise_(noise),
-      mount_(camera_mount(spec.mount)),
       seed_(seed),
-      lidar_(lidar) {
+      lidar_(lidar),
+      exposures_({spec.rate_Hz, spec.latency_s, noise.sweep_dropout_ratio, seed, 0x2000U + lidar},
+                 camera_mount(spec.mount)) {
   for (const LidarRay& ray : pattern) ray_L_.push_back(direction(ray));
   for (int ring = 0; pattern.empty() && ring < spec.rings; ++ring) {
     const double share = spec.rings > 1 ? static_cast<double>(ring) / (spec.rings - 1) : 0.5;
@@ -87,33 +87,13 @@ SimulatedLidar::SimulatedLidar(const World& world, const LidarSpec& spec,
   point_L_m_.resize(ray_L_.size());
 }
 
-void SimulatedLidar::expose(MonotonicTime now, const Pose& X_WB) noexcept {
-  now_ = now;
-  if (now < next_) return;
-  next_ = now + from_seconds(1.0 / spec_.rate_Hz);
-  ++taken_;
-  Exposure& e = ring_[taken_ % ring_.size()];
-  e.stamp = now;
-  e.sequence = taken_;
-  e.X_WL = core::camera_pose(X_WB, mount_);
-  core::CounterRng rng(seed_, 0x2000U + lidar_);
-  rng.seek(std::uint64_t{taken_});
-  e.lost = rng.uniform() < noise_.sweep_dropout_ratio;
-}
-
 Status SimulatedLidar::read(firmware_if::LidarSweep& sweep) noexcept {
-  const Nanos latency = from_seconds(spec_.latency_s);
-  for (std::uint32_t sequence = taken_; sequence > last_read_ && taken_ - sequence < ring_.size();
-       --sequence) {
-    const Exposure& e = ring_[sequence % ring_.size()];
-    if (e.lost || e.stamp + latency > now_) continue;
-    cast(e);
-    last_read_ = sequence;
-    sweep = {e.stamp, e.sequence, static_cast<float>(spec_.range_min_m), static_cast<float>(spec_.range_m),
-             std::span(point_L_m_).first(points_)};
-    return Status::kOk;
-  }
-  return Status::kNotReady;
+  const Exposure* e = exposures_.take();
+  if (e == nullptr) return Status::kNotReady;
+  cast(*e);
+  sweep = {e->stamp, e->sequence, static_cast<float>(spec_.range_min_m), static_cast<float>(spec_.range_m),
+           std::span(point_L_m_).first(points_)};
+  return Status::kOk;
 }
 
 void SimulatedLidar::cast(const Exposure& e) noexcept {
@@ -121,17 +101,14 @@ void SimulatedLidar::cast(const Exposure& e) noexcept {
   core::CounterRng rng(seed_, ((kStream + lidar_) << 40U) + e.sequence);
   points_ = 0;
   for (const Vector3& ray_L : ray_L_) {
-    const double hit_m = world_.hit_distance_m(e.X_WL.p_RT, e.X_WL.R_RT * ray_L, spec_.range_m, e.stamp);
+    const double hit_m = world_.hit_distance_m(e.X_WS.p_RT, e.X_WS.R_RT * ray_L, spec_.range_m, e.stamp);
     // Two draws for each ray, whatever it meets.
     const bool lost = rng.uniform() < noise_.point_dropout_ratio;
     const std::uint64_t bits = rng.next();
     if (lost) continue;
     double range_m = kBeyond * spec_.range_m;
     if (hit_m < spec_.range_m) {
-      // Sum of four 10-bit uniforms, as in the depth camera.
-      const double sum = static_cast<double>((bits & 1023U) + ((bits >> 10U) & 1023U) +
-                                             ((bits >> 20U) & 1023U) + ((bits >> 30U) & 1023U));
-      range_m = hit_m + (sum - 2046.0) / 591.2 * noise_.noise_m;
+      range_m = hit_m + bounded_normal(bits) * noise_.noise_m;
       if (range_m <= spec_.range_min_m) continue;
     }
     const Vector3 p_L = range_m * ray_L;

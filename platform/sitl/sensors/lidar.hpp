@@ -9,6 +9,7 @@
 #include "core/geometry/vector.hpp"
 #include "core/sensor_rig.hpp"
 #include "firmware_if/lidar.hpp"
+#include "platform/sitl/sensors/exposures.hpp"
 #include "platform/sitl/world/world.hpp"
 
 namespace roborun::sitl {
@@ -39,34 +40,23 @@ class SimulatedLidar final : public firmware_if::Lidar {
                  const LidarNoise& noise, std::uint64_t seed, std::uint32_t lidar);
 
   /// To be called at every minor frame with the true pose; takes a sweep when one is due.
-  void expose(MonotonicTime now, const Pose& X_WB) noexcept;
+  void expose(MonotonicTime now, const Pose& X_WB) noexcept { exposures_.expose(now, X_WB); }
   [[nodiscard]] Status read(firmware_if::LidarSweep& sweep) noexcept override;
-  [[nodiscard]] const firmware_if::CameraMount& mount() const noexcept override { return mount_; }
+  [[nodiscard]] const firmware_if::CameraMount& mount() const noexcept override { return exposures_.mount(); }
   [[nodiscard]] std::size_t rays() const noexcept { return ray_L_.size(); }
 
  private:
-  struct Exposure {
-    MonotonicTime stamp{};
-    std::uint32_t sequence{};
-    Pose X_WL{};
-    bool lost{};
-  };
   void cast(const Exposure& exposure) noexcept;
 
   const World& world_;
   LidarSpec spec_;
   LidarNoise noise_;
-  firmware_if::CameraMount mount_;
   std::uint64_t seed_;
   std::uint32_t lidar_;
   std::vector<Vector3> ray_L_;  ///< Of length 1.
   std::vector<std::array<float, 3>> point_L_m_;
   std::size_t points_{0};
-  std::array<Exposure, 32> ring_{};
-  std::uint32_t taken_{0};
-  std::uint32_t last_read_{0};
-  MonotonicTime now_{};
-  MonotonicTime next_{};
+  Exposures exposures_;
 };
 
 }  // namespace roborun::sitl
