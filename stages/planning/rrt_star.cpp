@@ -66,7 +66,8 @@ RrtStar::RrtStar(const Config& config, core::Arena& arena) noexcept
       node_(arena.take<Node>(config.max_nodes, "planner nodes")),
       node_pool_(arena.last_pool()),
       visited_(arena.take<std::uint64_t>(kVisited, "planner visited cells")),
-      grid_(config.max_nodes, arena) {
+      grid_(config.max_nodes, arena),
+      lattice_(config.lattice_nodes, arena) {
   ROBORUN_ASSERT(config.validate() == Status::kOk);
 }
 

@@ -9,6 +9,7 @@
 #include "core/memory/arena.hpp"
 #include "core/precision.hpp"
 #include "core/random/counter_rng.hpp"
+#include "stages/planning/lattice_search.hpp"
 #include "stages/planning/node_grid.hpp"
 #include "stages/planning/planner.hpp"
 #include "stages/planning/shorten.hpp"
@@ -33,16 +34,17 @@ class RrtStar final : public Planner {
     double rewire_m{8.0};             ///< Largest neighbourhood. [0.5, 50]
     /// Samples without an improvement of 1 % after which the answer is taken. [16, 1000000]
     std::uint32_t patience{250};
+    std::size_t lattice_nodes{1U << 20U};  ///< Of the lattice that is searched where sampling fails. [4096, 2^22]
     [[nodiscard]] constexpr Status validate() const noexcept {
       const bool ok = max_nodes >= 16 && max_nodes <= 100000 && max_samples >= 16 && max_samples <= 1000000 &&
                       step_m >= 0.5 && step_m <= 50 && rewire_m >= 0.5 && rewire_m <= 50 && patience >= 16 &&
-                      patience <= 1000000;
+                      patience <= 1000000 && lattice_nodes >= 4096 && lattice_nodes <= (1U << 22U);
       return ok ? Status::kOk : Status::kInvalidArgument;
     }
   };
   [[nodiscard]] static constexpr std::size_t arena_bytes(const Config& config) noexcept {
     return config.max_nodes * sizeof(Node) + kVisited * sizeof(std::uint64_t) + 128 +
-           NodeGrid::arena_bytes(config.max_nodes);
+           NodeGrid::arena_bytes(config.max_nodes) + LatticeSearch::arena_bytes(config.lattice_nodes);
   }
   /// Precondition, asserted: config.validate() is kOk. Check arena.exhausted() afterwards.
   RrtStar(const Config& config, core::Arena& arena) noexcept;
@@ -124,6 +126,8 @@ class RrtStar final : public Planner {
   [[nodiscard]] bool splice(Search& s, std::int32_t from, const Path& best_W, double bound_m,
                             Path& candidate_W) const noexcept;
   void add_path(const Path& path_W, core::Work& work) noexcept;
+  /// The first solution where sampling finds none.
+  [[nodiscard]] bool find_on_lattice(Search& s) noexcept;
 
   // It is not.
   /// `map`: what s.view polls for.
@@ -144,6 +148,7 @@ class RrtStar final : public Planner {
   core::PoolRecord& node_pool_;
   std::span<std::uint64_t> visited_;
   NodeGrid grid_;
+  LatticeSearch lattice_;
   std::size_t count_{0};
   std::int32_t goal_{-1};  ///< The goal's node, once it is reached.
 };

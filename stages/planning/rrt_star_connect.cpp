@@ -7,7 +7,7 @@
 namespace roborun::stages {
 namespace {
 
-constexpr std::uint32_t kFirstRounds = 600;  // without a way to the goal after which it counts as walled in
+constexpr std::uint32_t kFirstRounds = 24;  // of sampling, without a way to the goal
 constexpr std::uint32_t kSidestepRounds = 24;
 constexpr double kSlack = 1.03;  // a path of the tree may be so much longer than one pulled tight
 constexpr double kReach_m = 30.0;
@@ -189,9 +189,21 @@ Status RrtStar::improve(Search& s, double best_m, Path& best_W) noexcept {
   return Status::kOk;
 }
 
+bool RrtStar::find_on_lattice(Search& s) noexcept {
+  Path path_W;
+  clear(s);
+  if (lattice_.connect(s.request, s.view, s.budget, s.work, path_W) != Status::kOk || path_W.size() + 1 > node_.size())
+    return false;
+  std::int32_t parent = 0;
+  for (std::size_t i = 1; i < path_W.size() && may_add(); ++i) parent = add_node(path_W[i], parent, s.work);
+  if (node(parent).p_W != s.request.goal_W) return false;
+  goal_ = parent;
+  return true;
+}
+
 Status RrtStar::connect(Search& s, PlanResult& result) noexcept {
   const PlanRequest& request = s.request;
-  const bool found = find_first(s);
+  const bool found = find_first(s) || find_on_lattice(s);
   Path best_W;
   if (!found || !path_to(goal_, best_W)) {
     clear(s);

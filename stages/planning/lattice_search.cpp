@@ -1,0 +1,197 @@
+#include "stages/planning/lattice_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace roborun::stages {
+namespace {
+
+// A node's state: bit 0 blocked, bit 1 closed, bit 2 by the goal's side, bits 3 and 4 opened by either side, bits 5 to 7
+// the move that led to it.
+constexpr std::uint8_t kBlocked = 1, kClosed = 2, kGoalSide = 4, kOpened = 8;
+constexpr unsigned kMoveShift = 5;
+constexpr std::uint8_t kRoot = 6;  // no move: straight from the end
+/// Moves along x, y, z, there and back: m and m ^ 1 are opposite.
+constexpr std::array<std::array<std::int32_t, 3>, 6> kMove{
+    {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
+constexpr double kUnit_m = 1e-3;
+constexpr std::uint64_t kWeight = 2;  // of what is left
+constexpr unsigned kIndexBits = 24;
+constexpr std::uint32_t kPollEvery = 64;
+constexpr double kPhase_m = 1e-6;
+constexpr int kLongestRun = 1024;
+
+std::uint32_t units(double length_m) noexcept {
+  return static_cast<std::uint32_t>(std::fmin(length_m / kUnit_m + 0.5, 4e9));
+}
+
+}  // namespace
+
+LatticeSearch::LatticeSearch(std::size_t max_nodes, core::Arena& arena) noexcept
+    : state_(arena.take<std::uint8_t>(max_nodes, "lattice states")),
+      cost_(arena.take<std::uint32_t>(max_nodes, "lattice costs")) {
+  side_[0].heap = arena.take<std::uint64_t>(kHeap, "lattice heap, start");
+  side_[1].heap = arena.take<std::uint64_t>(kHeap, "lattice heap, goal");
+}
+
+bool LatticeSearch::lay_out(const PlanRequest& request, int cells) noexcept {
+  step_m_ = cells * kFinestCell_m;
+  if (cells > 1 && step_m_ > 2.0 * request.radius_m) return false;
+  std::array<std::int32_t, 3> count{};
+  double nodes = 1.0;
+  for (int i = 0; i < 3; ++i) {
+    const double low = std::fmax(request.bounds_W.min_W[i], request.start_W[i] - request.horizon_m);
+    const double high = std::fmin(request.bounds_W.max_W[i], request.start_W[i] + request.horizon_m);
+    // The low side of the box just inside a cell.
+    const double phase = request.radius_m + kPhase_m;
+    corner_W_[i] = std::ceil((low - phase) / kFinestCell_m) * kFinestCell_m + phase;
+    const double steps = std::fmin(std::floor((high - corner_W_[i]) / step_m_), 1e6);
+    if (!(steps >= 0.0)) return false;
+    count[static_cast<std::size_t>(i)] = static_cast<std::int32_t>(steps) + 1;
+    nodes *= steps + 1.0;
+  }
+  if (nodes > static_cast<double>(state_.size())) return false;
+  size_ = {count[0], count[1], count[2]};
+  std::fill_n(state_.begin(), static_cast<std::size_t>(nodes), std::uint8_t{0});
+  for (Side& side : side_) side.count = 0;
+  side_[0].from_W = side_[1].to_W = request.start_W;
+  side_[1].from_W = side_[0].to_W = request.goal_W;
+  overflown_ = false;
+  return true;
+}
+
+void LatticeSearch::push(int side, std::uint32_t index, std::uint32_t cost, std::uint8_t move) noexcept {
+  Side& s = side_[static_cast<std::size_t>(side)];
+  const auto opened = static_cast<std::uint8_t>(kOpened << static_cast<unsigned>(side));
+  std::uint8_t& state = state_[index];
+  if ((state & (kBlocked | kClosed | opened)) != 0) return;
+  if (s.count == s.heap.size()) {
+    overflown_ = true;
+    return;
+  }
+  state |= opened;
+  const std::uint64_t promise = cost + kWeight * units((s.to_W - at_W(index)).norm());
+  s.heap[s.count++] = (((promise << kIndexBits) | index) << 3U) | move;
+  std::push_heap(s.heap.begin(), s.heap.begin() + static_cast<std::ptrdiff_t>(s.count), std::greater<>());
+}
+
+void LatticeSearch::seed(const Task& task, int side) noexcept {
+  const Vector3& from_W = side_[static_cast<std::size_t>(side)].from_W;
+  const Vector3 local = (from_W - corner_W_) / step_m_;
+  const Cell low{static_cast<std::int32_t>(std::floor(local.x())), static_cast<std::int32_t>(std::floor(local.y())),
+                 static_cast<std::int32_t>(std::floor(local.z()))};
+  for (int corner = 0; corner < 8; ++corner) {
+    const Cell c{low.x + (corner & 1), low.y + ((corner >> 1) & 1), low.z + (corner >> 2)};
+    if (!inside(c)) continue;
+    const Vector3 p_W = at_W(index_of(c));
+    if (is_segment_free(task.view, from_W, p_W, task.request.radius_m, task.work.units))
+      push(side, index_of(c), units((p_W - from_W).norm()), kRoot);
+  }
+}
+
+bool LatticeSearch::step(const Task& task, int side) noexcept {
+  Side& s = side_[static_cast<std::size_t>(side)];
+  std::pop_heap(s.heap.begin(), s.heap.begin() + static_cast<std::ptrdiff_t>(s.count), std::greater<>());
+  const std::uint64_t entry = s.heap[--s.count];
+  const auto move = static_cast<std::uint8_t>(entry & 7U);
+  const auto at = static_cast<std::uint32_t>((entry >> 3U) & ((1U << kIndexBits) - 1U));
+  std::uint8_t& state = state_[at];
+  if ((state & (kBlocked | kClosed)) != 0) return false;
+  const Vector3 p_W = at_W(at);
+  if ((p_W - task.request.start_W).norm() > task.request.horizon_m ||
+      !task.view.is_free(Aabb::around(p_W, task.request.radius_m), task.work.units)) {
+    state |= kBlocked;
+    return false;
+  }
+  const auto bit = static_cast<std::uint8_t>(side == 1 ? kGoalSide : 0);
+  state = static_cast<std::uint8_t>(state | kClosed | bit | (move << kMoveShift));
+  const Cell cell = cell_of(at);
+  if (move == kRoot) {
+    cost_[at] = units((p_W - s.from_W).norm());
+  } else {
+    const auto& m = kMove[move];
+    cost_[at] = cost_[index_of({cell.x - m[0], cell.y - m[1], cell.z - m[2]})] + units(step_m_);
+  }
+  for (std::uint8_t next = 0; next < kMove.size(); ++next) {
+    const Cell to{cell.x + kMove[next][0], cell.y + kMove[next][1], cell.z + kMove[next][2]};
+    if (!inside(to)) continue;
+    const std::uint32_t index = index_of(to);
+    if ((state_[index] & kClosed) != 0 && (state_[index] & kGoalSide) != bit) {
+      met_[static_cast<std::size_t>(side)] = at;
+      met_[static_cast<std::size_t>(1 - side)] = index;
+      return true;
+    }
+    push(side, index, cost_[at] + units(step_m_), next);
+  }
+  return false;
+}
+
+Status LatticeSearch::run(const Task& task) noexcept {
+  for (std::uint32_t i = 1; side_[0].count > 0 && side_[1].count > 0; ++i) {
+    if (i % kPollEvery == 0 && task.budget.spent(task.work)) return Status::kBudgetSpent;
+    if (step(task, static_cast<int>(i % 2))) return Status::kOk;
+  }
+  return overflown_ ? Status::kBudgetSpent : Status::kNoPath;
+}
+
+std::uint32_t LatticeSearch::before(std::uint32_t index, int moves) const noexcept {
+  Cell c = cell_of(index);
+  for (; moves > 0 && state_[index] >> kMoveShift != kRoot; --moves) {
+    const auto& m = kMove[static_cast<std::size_t>(state_[index] >> kMoveShift)];
+    c = {c.x - m[0], c.y - m[1], c.z - m[2]};
+    index = index_of(c);
+  }
+  return index;
+}
+
+bool LatticeSearch::walk_back(const Task& task, std::uint32_t at, int side, Path& path_W) const noexcept {
+  const Vector3& end_W = side_[static_cast<std::size_t>(side)].from_W;
+  const auto reaches = [&](const Vector3& p_W) {
+    return is_segment_free(task.view, path_W.back(), p_W, task.request.radius_m, task.work.units);
+  };
+  while (state_[at] >> kMoveShift != kRoot) {
+    // Straight back as far as doubled numbers of moves reach, then halved ones.
+    std::uint32_t next = before(at, 1);
+    int moves = 1;
+    for (; moves < kLongestRun && state_[next] >> kMoveShift != kRoot; moves *= 2) {
+      const std::uint32_t farther = before(next, moves);
+      if (!reaches(at_W(farther))) break;
+      next = farther;
+    }
+    for (moves /= 2; moves > 0 && state_[next] >> kMoveShift != kRoot; moves /= 2) {
+      const std::uint32_t farther = before(next, moves);
+      if (reaches(at_W(farther))) next = farther;
+    }
+    if (state_[next] >> kMoveShift == kRoot && reaches(end_W)) break;
+    if (!path_W.push_back(at_W(next))) return false;
+    at = next;
+  }
+  return path_W.push_back(end_W);
+}
+
+void LatticeSearch::extract(const Task& task, Path& path_W) noexcept {
+  Path back_W;
+  (void)back_W.push_back(at_W(met_[0]));
+  path_W.clear();
+  if (!walk_back(task, met_[0], 0, back_W)) return;
+  for (std::size_t i = back_W.size(); i-- > 0;) (void)path_W.push_back(back_W[i]);
+  if (!path_W.push_back(at_W(met_[1])) || !walk_back(task, met_[1], 1, path_W)) path_W.clear();
+}
+
+Status LatticeSearch::connect(const PlanRequest& request, const MapView& view, core::StageBudget& budget,
+                              core::Work& work, Path& path_W) noexcept {
+  const Task task{request, view, budget, work};
+  path_W.clear();
+  for (const int cells : kSteps) {
+    if (!lay_out(request, cells)) continue;
+    seed(task, 0);
+    seed(task, 1);
+    const Status status = run(task);
+    if (status == Status::kOk) extract(task, path_W);
+    if (status == Status::kBudgetSpent || path_W.size() > 1) return status;
+  }
+  return Status::kNoPath;
+}
+
+}  // namespace roborun::stages
