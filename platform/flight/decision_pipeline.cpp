@@ -19,12 +19,6 @@ constexpr double kTooFast = 1.5;
 /// What the way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
 constexpr double kBeyond_mps = 2.0;
 
-/// When the vehicle would be at the goal, counted from in.now.
-double arrival_s(const Trajectory& trajectory, const DecisionInput& in) noexcept {
-  return seconds(trajectory.start_time - in.now) + trajectory.duration_s() +
-         (in.goal_W - trajectory.end_W()).norm() / kBeyond_mps;
-}
-
 }  // namespace
 
 Vector3 assumed_free_half_m(const VehicleModel& vehicle, bool sees_all_around,
@@ -41,14 +35,15 @@ Vector3 assumed_free_half_m(const VehicleModel& vehicle, bool sees_all_around,
 DecisionPipeline::DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter,
                                    governor::DecisionPolicy& policy, stages::PointCloud& cloud,
                                    stages::OccupancyMap& map, stages::Planner& planner,
-                                   stages::Smoother& smoother) noexcept
+                                   stages::Smoother& smoother, stages::WayMemory* ways) noexcept
     : config_(config),
       meter_(meter),
       policy_(policy),
       cloud_(cloud),
       map_(map),
       planner_(planner),
-      smoother_(smoother) {
+      smoother_(smoother),
+      ways_(ways) {
   cloud_.set_height_limits(config.map_bounds_W.min_W.z(), config.map_bounds_W.max_W.z());
 }
 
@@ -188,6 +183,7 @@ void DecisionPipeline::search(const DecisionInput& in, double room_m, DecisionOu
   request.volume_m3 = std::max(out.decision.point.v2_m3 - draft_.planner_work.volume_m3, 0.0);
   request.horizon_m = config_.horizon_m;
   request.kept_W = kept_W_;
+  request.ways = ways_known_ ? ways_ : nullptr;
   request.seed = in.seed;
   meter_.charge_to(core::StageId::kPlanner);
   stages::PlanResult planned;
@@ -229,7 +225,23 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
                                           config_.vehicle.radius_m, draft_.planner_work.units);
   draft_.planner_work.level = out.decision.point.p1_level;
   draft_.planner_budget.emplace(budget_of(core::StageId::kPlanner, out));
+  remember(in);
   search(in, kCornerRoom_m, out);
+}
+
+void DecisionPipeline::remember(const DecisionInput& in) noexcept {
+  ways_known_ = false;
+  if (ways_ == nullptr) return;
+  core::Work work;
+  if (ways_->look(map_.view(), in.p_WB, config_.horizon_m + 1.0, *draft_.planner_budget, work) != Status::kOk) return;
+  ways_known_ = ways_->solve(draft_.start.p_W, in.goal_W, *draft_.planner_budget, work) == Status::kOk;
+  draft_.planner_work.units += work.units;
+}
+
+double DecisionPipeline::arrival_s(const Trajectory& trajectory, const DecisionInput& in) const noexcept {
+  double rest_m = (in.goal_W - trajectory.end_W()).norm();
+  if (ways_known_) rest_m = std::fmin(ways_->to_goal_m(trajectory.end_W()) / stages::kUnknownWeight, 1e6);
+  return seconds(trajectory.start_time - in.now) + trajectory.duration_s() + rest_m / kBeyond_mps;
 }
 
 void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noexcept {

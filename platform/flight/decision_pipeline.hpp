@@ -23,6 +23,7 @@
 #include "stages/perception/space_profiler.hpp"
 #include "stages/planning/planner.hpp"
 #include "stages/planning/smoother.hpp"
+#include "stages/planning/way_memory.hpp"
 
 namespace roborun::flight {
 
@@ -84,7 +85,7 @@ class DecisionPipeline {
   /// Policy, map and planner are given from outside, so that any backend flies with any design.
   DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter, governor::DecisionPolicy& policy,
                    stages::PointCloud& cloud, stages::OccupancyMap& map, stages::Planner& planner,
-                   stages::Smoother& smoother) noexcept;
+                   stages::Smoother& smoother, stages::WayMemory* ways = nullptr) noexcept;
 
   /// One stage of a decision; all of them in order make one. `out` is begun by the first (kPointCloud) and
   /// complete after the last (kSmoother). Where the path leaves the smoother no room, kSmoother plans once
@@ -130,6 +131,10 @@ class DecisionPipeline {
   void export_map(const DecisionInput& in, DecisionOutput& out) noexcept;
   void plan(const DecisionInput& in, DecisionOutput& out) noexcept;
   void smooth(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// What is known of the ways, from here.
+  void remember(const DecisionInput& in) noexcept;
+  /// When the vehicle would be at the goal, counted from in.now.
+  [[nodiscard]] double arrival_s(const Trajectory& trajectory, const DecisionInput& in) const noexcept;
   /// One search, with so much room around the vehicle; the path goes to kept_W_.
   void search(const DecisionInput& in, double room_m, DecisionOutput& out) noexcept;
   /// The path of the last search as a trajectory.
@@ -148,6 +153,8 @@ class DecisionPipeline {
   stages::OccupancyMap& map_;
   stages::Planner& planner_;
   stages::Smoother& smoother_;
+  stages::WayMemory* ways_;  ///< Null: the planner knows its horizon alone.
+  bool ways_known_{false};   ///< In this decision.
   stages::Path kept_W_;  ///< What was planned last.
   MotionWatch motion_;
   bool has_planned_{false};  ///< A plan was found since the take-off.

@@ -24,6 +24,10 @@ PipelineConfig pipeline_config(const FlightConfig& config) noexcept {
   return pipeline;
 }
 
+stages::WayMemory::Config way_config(const FlightConfig& config) noexcept {
+  return {config.bounds_W, planned_radius_m(config.vehicle), config.fence};
+}
+
 /// No faster than the vehicle turns.
 GazeConfig gaze_of(const FlightConfig& config) noexcept {
   GazeConfig gaze = config.gaze;
@@ -84,6 +88,7 @@ std::size_t FlightSystem::arena_bytes(const FlightConfig& config) noexcept {
   std::size_t bytes = stages::PointCloud::arena_bytes({});
   for (const std::uint16_t pixels : config.cloud_pixels)
     if (pixels > 0) bytes += stages::CloudImages::arena_bytes({pixels});
+  bytes += stages::WayMemory::arena_bytes(way_config(config));
   return bytes;
 }
 
@@ -92,9 +97,11 @@ FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, 
                            core::Arena& arena, std::span<firmware_if::Lidar* const> lidars) noexcept
     : map_((ROBORUN_ASSERT(config.validate() == Status::kOk), parts.map)),
       cloud_({}, arena),
+      ways_(way_config(config), arena),
       governor_(governor_config(config)),
       policy_(parts.policy != nullptr ? *parts.policy : governor_),
-      pipeline_(pipeline_config(config), meter, policy_, cloud_, parts.map, parts.planner, smoother_),
+      pipeline_(pipeline_config(config), meter, policy_, cloud_, parts.map, parts.planner, smoother_,
+                config.design == governor::Design::kAware ? &ways_ : nullptr),
       control_(config.vehicle, seconds(config.minor_frame), gaze_of(config)),
       flight_program_({config.vehicle, config.fence, config.answers}, control_, aircraft, mail_),
       decision_program_({config.goal_W, config.seed, config.fence, config.minor_frame}, pipeline_, cameras,

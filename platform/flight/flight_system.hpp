@@ -51,6 +51,7 @@ class FlightSystem {
   stages::OccupancyMap& map_;
   stages::PointCloud cloud_;
   stages::Smoother smoother_;
+  stages::WayMemory ways_;
   governor::Governor governor_;  ///< Idle if the policy is the reader's own.
   governor::DecisionPolicy& policy_;
   DecisionPipeline pipeline_;

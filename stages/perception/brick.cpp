@@ -67,6 +67,32 @@ void Brick::refresh() noexcept {
   stale = false;
 }
 
+void Brick::read(CellBlock& cells) const noexcept {
+  cells = {};
+  for (std::size_t w = 0; w < word.size(); ++w) {
+    // The cells of a word are 4 x 2 x 2, x lowest and highest.
+    std::size_t cx = 0, cy = 0, cz = 0;
+    for (unsigned bit = 0; bit < 8; ++bit) {  // of the Morton index, from 4 on
+      const std::size_t set = (w >> bit) & 1U;
+      const unsigned axis = (bit + 4) % 3, power = (bit + 4) / 3;
+      (axis == 0 ? cx : axis == 1 ? cy : cz) |= set << power;
+    }
+    const Word not_free = word[w] ^ (kOnes * evidence::kFree);
+    const Word folded = not_free | (not_free >> 1U) | (not_free >> 2U) | (not_free >> 3U);
+    const Word free = ~folded & kOnes, occupied = (word[w] >> 3U) & kOnes;
+    for (unsigned pair = 0; pair < 4; ++pair) {
+      const auto four = [pair](Word bits) {
+        const Word b = bits >> (8U * pair);
+        const Word high = bits >> (8U * pair + 32U);
+        return (b & 1U) | ((b >> 3U) & 2U) | ((high << 2U) & 4U) | ((high >> 1U) & 8U);
+      };
+      const std::size_t row = kBlockCells * (cz + pair / 2) + cy + pair % 2;
+      cells.free[row] = static_cast<std::uint16_t>(cells.free[row] | (four(free) << cx));
+      cells.occupied[row] = static_cast<std::uint16_t>(cells.occupied[row] | (four(occupied) << cx));
+    }
+  }
+}
+
 void Brick::set_cell(std::uint32_t morton, unsigned value) noexcept {
   const unsigned shift = 4U * (morton % kCellsPerWord);
   Word& w = word[morton / kCellsPerWord];

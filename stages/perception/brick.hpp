@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "stages/perception/brick_cells.hpp"
+#include "stages/perception/cell_block.hpp"
 
 namespace roborun::stages {
 
@@ -26,6 +27,8 @@ struct Brick {
     return static_cast<unsigned>(word[morton / kCellsPerWord] >> (4U * (morton % kCellsPerWord))) & 0xFU;
   }
   void set_cell(std::uint32_t morton, unsigned value) noexcept;
+  /// All cells as bits. O(4096).
+  void read(CellBlock& cells) const noexcept;
   /// Flags of the cell of `level` (0 .. 4) with this Morton index. After refresh(). O(1).
   [[nodiscard]] inline std::uint8_t flags(int level, std::uint32_t morton) const noexcept;
   /// Free evidence for the blocks of `level` with Morton index 8 * parent + i, for each bit i of `blocks`.

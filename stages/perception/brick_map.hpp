@@ -98,6 +98,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   }
   [[nodiscard]] CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept override;
   [[nodiscard]] double cell_m() const noexcept override { return cell_size_m(view_level_); }
+  [[nodiscard]] BlockContent read(const Vector3& corner_W, CellBlock& cells,
+                                  std::uint64_t& lookups) const noexcept override;
 
   [[nodiscard]] std::size_t usable_frames(const IntegrationRequest& request,
                                           IntegrationResult& result) noexcept;

@@ -15,6 +15,22 @@ double spacing_m(const MapView& view, double radius_m) noexcept {
 
 }  // namespace
 
+BlockContent read_cell_by_cell(const MapView& view, const Vector3& corner_W, CellBlock& cells, std::uint64_t& lookups) noexcept {
+  std::uint32_t free = 0, occupied = 0;
+  cells = {};
+  for (std::size_t row = 0; row < cells.free.size(); ++row) {
+    for (unsigned x = 0; x < kBlockCells; ++x) {
+      const Vector3 index(x, static_cast<double>(row % kBlockCells), static_cast<double>(row / kBlockCells));
+      const CellState state = view.at(corner_W + kFinestCell_m * (index + Vector3::Constant(0.5)), lookups);
+      const auto bit = static_cast<std::uint16_t>(1U << x);
+      if (state == CellState::kFree) cells.free[row] |= bit, ++free;
+      if (state == CellState::kOccupied) cells.occupied[row] |= bit, ++occupied;
+    }
+  }
+  if (free == kBlockCells * cells.free.size()) return BlockContent::kFree;
+  return free + occupied == 0 ? BlockContent::kUnknown : BlockContent::kMixed;
+}
+
 bool is_segment_free(const MapView& view, const Vector3& a_W, const Vector3& b_W, double radius_m,
                      std::uint64_t& lookups) noexcept {
   const double length_m = (b_W - a_W).norm();

@@ -15,6 +15,8 @@ namespace roborun::stages {
 /// A metre of space that nobody has seen yet counts as this many metres of known path: it may hide a detour.
 inline constexpr double kUnknownWeight = 2.0;
 
+class WayMemory;
+
 inline constexpr std::size_t kMaxWaypoints = 64;
 using Path = core::StaticVector<Vector3, kMaxWaypoints>;
 
@@ -29,6 +31,8 @@ struct PlanRequest {
   double satisfied_m{};  ///< A path to the goal of at most this length ends the search; 0: search on.
   /// The path of the plan before, or empty: a hint. Nothing of it is taken unchecked.
   Path kept_W{};
+  /// What is known of the ways to the goal, or null: then the rest of a way counts as straight and unknown.
+  const WayMemory* ways{nullptr};
   std::uint64_t seed{};  ///< Same request, same map, same seed: same path.
 };
 

@@ -7,6 +7,7 @@
 #include "core/geometry/math.hpp"
 #include "firmware_if/assert.hpp"
 #include "stages/perception/polled_view.hpp"
+#include "stages/planning/way_memory.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -71,12 +72,14 @@ RrtStar::RrtStar(const Config& config, core::Arena& arena) noexcept
   ROBORUN_ASSERT(config.validate() == Status::kOk);
 }
 
-double RrtStar::promise_m(const Node& node, const Vector3& goal_W) const noexcept {
-  return node.cost_m + kUnknownWeight * (goal_W - node.p_W).norm();
+double RrtStar::promise_m(const Node& node, const PlanRequest& request) const noexcept {
+  if (request.ways != nullptr) return node.cost_m + request.ways->to_goal_m(node.p_W);
+  return node.cost_m + kUnknownWeight * (request.goal_W - node.p_W).norm();
 }
 
 double RrtStar::detour_m(const PlanRequest& request, const MapView& view, const Vector3& p_W,
                          std::uint64_t& lookups) const noexcept {
+  if (request.ways != nullptr) return 0.0;  // they know
   const Vector3 way = request.goal_W - p_W;
   const double distance_m = way.norm();
   if (distance_m < kShortEdge_m) return 0.0;
@@ -324,13 +327,35 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
   return explore(s, map, goal_bad, best, result);
 }
 
+bool RrtStar::follow_ways(Search& s, const MapView& map, double below_m, PlanResult& result) noexcept {
+  std::array<Vector3, kMaxWaypoints> way_W;
+  const std::size_t count = s.request.ways->known_way(s.request.start_W, s.request.horizon_m - 1.0, way_W);
+  for (std::size_t i = count; i-- > 0;) {
+    const double rest_m = s.request.ways->to_goal_m(way_W[i]);
+    if ((way_W[i] - s.request.start_W).norm() < 1.0 || !((way_W[i] - s.request.start_W).norm() + rest_m < below_m)) continue;
+    PlanRequest request = s.request;
+    request.goal_W = way_W[i];
+    if (!map.is_free(Aabb::around(request.goal_W, request.radius_m), s.work.units)) continue;
+    Search to_it{request, s.view, s.budget, s.work, s.rng};
+    clear(to_it);
+    PlanResult found;
+    found.work = {};
+    const Status status = connect(to_it, found);
+    if ((status != Status::kOk && status != Status::kBudgetSpent) || !(found.cost_m + rest_m < below_m)) continue;
+    result.path_W = found.path_W;
+    result.cost_m = found.cost_m;
+    return true;
+  }
+  return false;
+}
+
 Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32_t best,
                         PlanResult& result) noexcept {
   const PlanRequest& request = s.request;
   const MapView& view = s.view;
   core::Work& work = s.work;
   Status status = Status::kOk;
-  double best_m = promise_m(node(best), request.goal_W) + detour_m(request, view, node(best).p_W, work.units);
+  double best_m = promise_m(node(best), request) + detour_m(request, view, node(best).p_W, work.units);
   Patience patience(best_m, config_.patience);
   const Samples kept_W = in_steps(request.kept_W, config_.step_m, request.bounds_W);
   for (std::uint32_t i = 0; i < config_.max_samples && !full(); ++i) {
@@ -343,7 +368,7 @@ Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32
     if ((sample_W - request.start_W).norm() > best_m) continue;
     const std::int32_t added = try_extend(s, sample_W, std::numeric_limits<double>::infinity());
     if (added >= 0) {
-      double promise = promise_m(node(added), request.goal_W);
+      double promise = promise_m(node(added), request);
       if (promise < best_m) promise += detour_m(request, view, node(added).p_W, work.units);
       if (promise < best_m) {
         best_m = promise;
@@ -355,8 +380,10 @@ Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32
 
   // Better than standing still by at least one cell of the view.
   const double stay_m =
-      promise_m(node(0), request.goal_W) + detour_m(request, view, request.start_W, work.units);
-  if (best == 0 || best_m > stay_m - view.cell_m()) return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
+      promise_m(node(0), request) + detour_m(request, view, request.start_W, work.units);
+  if (request.ways != nullptr && follow_ways(s, map, std::fmin(best_m, stay_m) - view.cell_m(), result))
+    return goal_bad ? Status::kGoalBlocked : Status::kOk;
+  if (best == 0 || !(best_m <= stay_m - view.cell_m())) return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
   Spare spare(work);
   extract(request, PolledView(map, spare, work), best, result);
   if (result.path_W.size() < 2) return Status::kNoPath;

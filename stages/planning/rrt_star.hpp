@@ -131,10 +131,12 @@ class RrtStar final : public Planner {
 
   // It is not.
   /// `map`: what s.view polls for.
+  /// To where the ways that are known lead on: a path of at most `below_m` with its rest, as a whole.
+  [[nodiscard]] bool follow_ways(Search& s, const MapView& map, double below_m, PlanResult& result) noexcept;
   [[nodiscard]] Status explore(Search& s, const MapView& map, bool goal_bad, std::int32_t best,
                                PlanResult& result) noexcept;
   [[nodiscard]] Vector3 sample(Search& s) const noexcept;
-  [[nodiscard]] double promise_m(const Node& node, const Vector3& goal_W) const noexcept;
+  [[nodiscard]] double promise_m(const Node& node, const PlanRequest& request) const noexcept;
   /// What the first surface on the straight way on to the goal will cost, 0 if none is known within 12 m.
   [[nodiscard]] double detour_m(const PlanRequest& request, const MapView& view, const Vector3& p_W,
                                 std::uint64_t& lookups) const noexcept;

@@ -1,0 +1,346 @@
+#include "stages/planning/way_memory.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/random/counter_rng.hpp"
+#include "core/precision.hpp"
+
+namespace roborun::stages {
+namespace {
+
+constexpr std::size_t kMaxPositions = 1U << 18U;
+constexpr std::size_t kHeap = 1U << 17U;
+constexpr std::int32_t kWindow = 13, kWindowHeight = 9;  // blocks of one look, and one more for the widths
+constexpr std::size_t kWindowBlocks =
+    static_cast<std::size_t>(kWindow + 1) * (kWindow + 1) * (kWindowHeight + 1);
+constexpr std::int32_t kOutside = 0;
+
+std::int32_t whole(double x) noexcept { return static_cast<std::int32_t>(std::floor(x)); }
+
+std::uint64_t digest_of(const CellBlock& cells) noexcept {
+  std::uint64_t digest = 1;
+  for (std::size_t i = 0; i < cells.free.size(); i += 2) {
+    const std::uint64_t four = (std::uint64_t{cells.free[i]} << 48U) | (std::uint64_t{cells.free[i + 1]} << 32U) |
+                               (std::uint64_t{cells.occupied[i]} << 16U) | cells.occupied[i + 1];
+    digest = (digest ^ four) * 0x9E3779B97F4A7C15ULL;
+    digest ^= digest >> 29U;
+  }
+  return digest;
+}
+
+}  // namespace
+
+std::size_t WayMemory::arena_bytes(const Config& config) noexcept {
+  const Vector3 size = config.bounds_W.size();
+  double positions = 1.0;
+  for (int i = 0; i < 3; ++i) positions *= std::ceil(size[i] / kBlock_m) + 2.0;
+  const auto count = static_cast<std::size_t>(std::fmin(positions, static_cast<double>(kMaxPositions)));
+  return count * (sizeof(std::int32_t) + sizeof(std::uint64_t) + sizeof(Node)) +
+         config.max_blocks * (sizeof(Block) + sizeof(std::uint32_t) + kRooms * sizeof(Node)) +
+         kWindowBlocks * (sizeof(CellBlock) + sizeof(BlockContent) + sizeof(std::uint64_t)) +
+         kHeap * sizeof(std::uint64_t) + 1024;
+}
+
+WayMemory::WayMemory(const Config& config, core::Arena& arena) noexcept
+    : config_(config), width_(static_cast<int>(std::ceil(2.0 * config.radius_m / kFinestCell_m - 1e-6))) {
+  std::array<std::int32_t, 3> corner{}, size{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double low = std::floor((config.bounds_W.min_W[static_cast<int>(i)] - config.radius_m) / kBlock_m);
+    const double high = std::floor(config.bounds_W.max_W[static_cast<int>(i)] / kBlock_m) + 1.0;
+    corner[i] = static_cast<std::int32_t>(low) * kBlockCells;
+    size[i] = static_cast<std::int32_t>(high - low);
+  }
+  corner_ = {corner[0], corner[1], corner[2]};
+  size_ = {size[0], size[1], size[2]};
+  const auto positions = static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y) *
+                         static_cast<std::size_t>(size_.z);
+  kind_ = arena.take<std::int32_t>(positions, "way positions");
+  digest_ = arena.take<std::uint64_t>(positions, "way digests");
+  block_ = arena.take<Block>(config.max_blocks, "way blocks");
+  free_ = arena.take<std::uint32_t>(config.max_blocks, "way free list");
+  window_ = arena.take<CellBlock>(kWindowBlocks, "way window");
+  window_content_ = arena.take<BlockContent>(kWindowBlocks, "way window contents");
+  window_digest_ = arena.take<std::uint64_t>(kWindowBlocks, "way window digests");
+  node_ = arena.take<Node>(positions + kRooms * config.max_blocks, "way nodes");
+  heap_ = arena.take<std::uint64_t>(kHeap, "way heap");
+  std::fill(kind_.begin(), kind_.end(), kOpen);
+  for (std::size_t i = 0; i < free_.size(); ++i) free_[i] = static_cast<std::uint32_t>(free_.size() - 1 - i);
+  free_count_ = free_.size();
+}
+
+WayMemory::Cell WayMemory::place_of(const Vector3& p_W) const noexcept {
+  const auto axis = [&](double p, std::int32_t corner) {
+    return whole(p / kFinestCell_m - 0.5 * width_ + 0.5) - corner;
+  };
+  return {axis(p_W.x(), corner_.x), axis(p_W.y(), corner_.y), axis(p_W.z(), corner_.z)};
+}
+
+Vector3 WayMemory::at_W(const Cell& place) const noexcept {
+  return kFinestCell_m * Vector3(place.x + corner_.x + 0.5 * width_, place.y + corner_.y + 0.5 * width_,
+                                 place.z + corner_.z + 0.5 * width_);
+}
+
+unsigned WayMemory::room_at(const Cell& place) const noexcept {
+  const Cell block{place.x >> 4, place.y >> 4, place.z >> 4};
+  if (!has(block)) return 0;
+  const std::int32_t kind = kind_[position_of(block)];
+  if (kind == kOpen) return kFirstOpenRoom;
+  if (kind == kKnown) return 1;
+  if (kind == kClosed) return 0;
+  return block_[static_cast<std::size_t>(kind)].rooms.at(place.x & 15, place.y & 15, place.z & 15);
+}
+
+bool WayMemory::nearest_room(const Vector3& p_W, Cell& place) const noexcept {
+  if (!is_finite(p_W) || !(p_W.cwiseAbs().maxCoeff() < 1e5)) return false;
+  const Cell at = place_of(p_W);
+  int best = 1000;
+  for (std::int32_t dz = -2; dz <= 2; ++dz) {
+    for (std::int32_t dy = -2; dy <= 2; ++dy) {
+      for (std::int32_t dx = -2; dx <= 2; ++dx) {
+        const Cell c{at.x + dx, at.y + dy, at.z + dz};
+        const unsigned room = room_at(c);
+        if (room == 0) continue;
+        const int cost = dx * dx + dy * dy + dz * dz + (is_known_room(room) ? 0 : 100);
+        if (cost >= best) continue;
+        best = cost;
+        place = c;
+      }
+    }
+  }
+  return best < 1000;
+}
+
+std::uint32_t WayMemory::node_of(std::uint32_t position, unsigned room) const noexcept {
+  const std::int32_t kind = kind_[position];
+  if (kind < 0) return position;
+  return static_cast<std::uint32_t>(kind_.size() + kRooms * static_cast<std::size_t>(kind) + room);
+}
+
+WayMemory::Block* WayMemory::take(std::uint32_t position) noexcept {
+  std::int32_t& kind = kind_[position];
+  if (kind >= 0) return &block_[static_cast<std::size_t>(kind)];
+  if (free_count_ == 0) return nullptr;
+  kind = static_cast<std::int32_t>(free_[--free_count_]);
+  Block& block = block_[static_cast<std::size_t>(kind)];
+  block.position = position;
+  return &block;
+}
+
+Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, core::StageBudget& budget,
+                       core::Work& work) noexcept {
+  const Cell at = place_of(p_W);
+  const auto blocks = static_cast<std::int32_t>(std::ceil(reach_m / kBlock_m));
+  const std::int32_t side = std::min(blocks, (kWindow - 1) / 2), up = std::min(blocks, (kWindowHeight - 1) / 2);
+  const Cell low{std::max((at.x >> 4) - side, kOutside), std::max((at.y >> 4) - side, kOutside),
+                 std::max((at.z >> 4) - up, kOutside)};
+  const Cell high{std::min((at.x >> 4) + side, size_.x - 1), std::min((at.y >> 4) + side, size_.y - 1),
+                  std::min((at.z >> 4) + up, size_.z - 1)};
+  if (low.x > high.x || low.y > high.y || low.z > high.z) return Status::kInvalidArgument;
+  return read(map, low, high, budget, work) ? Status::kOk : Status::kBudgetSpent;
+}
+
+bool WayMemory::read(const MapView& map, const Cell& low, const Cell& high, core::StageBudget& budget,
+                     core::Work& work) noexcept {
+  // One block more to the far sides: vehicles reach into it.
+  const Cell wide{high.x - low.x + 2, high.y - low.y + 2, high.z - low.z + 2};
+  const auto index = [&wide](std::int32_t x, std::int32_t y, std::int32_t z) {
+    return static_cast<std::size_t>((z * wide.y + y) * wide.x + x);
+  };
+  for (std::int32_t z = 0; z < wide.z; ++z) {
+    for (std::int32_t y = 0; y < wide.y; ++y) {
+      if (budget.spent(work)) return false;
+      for (std::int32_t x = 0; x < wide.x; ++x) {
+        const std::size_t i = index(x, y, z);
+        const Vector3 corner_W = kFinestCell_m * Vector3(corner_.x + kBlockCells * (low.x + x),
+                                                         corner_.y + kBlockCells * (low.y + y),
+                                                         corner_.z + kBlockCells * (low.z + z));
+        window_content_[i] = map.read(corner_W, window_[i], work.units);
+        window_digest_[i] = window_content_[i] == BlockContent::kMixed ? digest_of(window_[i]) | 4U
+                                                                       : static_cast<std::uint64_t>(window_content_[i]);
+      }
+    }
+  }
+  if (seen_low_.x > seen_high_.x) seen_low_ = low, seen_high_ = high;
+  seen_low_ = {std::min(seen_low_.x, low.x), std::min(seen_low_.y, low.y), std::min(seen_low_.z, low.z)};
+  seen_high_ = {std::max(seen_high_.x, high.x), std::max(seen_high_.y, high.y), std::max(seen_high_.z, high.z)};
+  std::array<Cell, 512> changed{};
+  std::size_t count = 0;
+  for (std::int32_t z = low.z; z <= high.z; ++z) {
+    for (std::int32_t y = low.y; y <= high.y; ++y) {
+      for (std::int32_t x = low.x; x <= high.x; ++x) {
+        WayCells cells;
+        std::uint64_t digest = 0;
+        for (std::int32_t i = 0; i < 8; ++i) {
+          const std::size_t w = index(x - low.x + (i & 1), y - low.y + ((i >> 1) & 1), z - low.z + (i >> 2));
+          cells.block[static_cast<std::size_t>(i)] = &window_[w];
+          cells.content[static_cast<std::size_t>(i)] = window_content_[w];
+          digest = core::mix64(digest + window_digest_[w] + 1);
+        }
+        std::uint64_t& before = digest_[position_of({x, y, z})];
+        if (before == digest) continue;
+        if (count == changed.size() || budget.spent(work)) break;
+        before = digest;
+        renew({x, y, z}, cells);
+        changed[count++] = {x, y, z};
+      }
+    }
+  }
+  // Their doors, and those of their neighbours to them.
+  for (std::size_t i = 0; i < count; ++i) {
+    find_doors(changed[i]);
+    for (std::size_t face = 0; face < kFaces; ++face) {
+      const std::int32_t by = face % 2 == 0 ? 1 : -1;
+      const Cell next{changed[i].x + (face / 2 == 0 ? by : 0), changed[i].y + (face / 2 == 1 ? by : 0),
+                      changed[i].z + (face / 2 == 2 ? by : 0)};
+      if (!has(next)) continue;
+      const std::int32_t kind = kind_[position_of(next)];
+      if (kind >= 0) find_face_doors(block_[static_cast<std::size_t>(kind)], next, face ^ 1U);
+    }
+  }
+  work.units += 64 * count;
+  return true;
+}
+
+void WayMemory::forbid(const Cell& block, WayPlaces& places) const noexcept {
+  const Cell first{kBlockCells * block.x, kBlockCells * block.y, kBlockCells * block.z};
+  const Vector3 r = Vector3::Constant(config_.radius_m);
+  const Vector3 low_W = at_W(first), high_W = at_W({first.x + 15, first.y + 15, first.z + 15});
+  const Aabb& bounds_W = config_.bounds_W;
+  if (bounds_W.contains(low_W) && bounds_W.contains(high_W) &&
+      (config_.fence.empty() || config_.fence.allows(Aabb{low_W - r, high_W + r})))
+    return;
+  for (std::int32_t i = 0; i < 256; ++i) {
+    for (std::int32_t x = 0; x < kBlockCells; ++x) {
+      const Vector3 p_W = at_W({first.x + x, first.y + i % kBlockCells, first.z + i / kBlockCells});
+      if (bounds_W.contains(p_W) && (config_.fence.empty() || config_.fence.allows(Aabb{p_W - r, p_W + r}))) continue;
+      const auto keep = static_cast<std::uint16_t>(~(1U << static_cast<unsigned>(x)));
+      places.known[static_cast<std::size_t>(i)] &= keep;
+      places.open[static_cast<std::size_t>(i)] &= keep;
+    }
+  }
+}
+
+void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
+  WayPlaces places;
+  find_places(cells, width_, places);
+  forbid(block, places);
+  const auto all = [](const CellRows& rows, std::uint16_t value) {
+    return std::all_of(rows.begin(), rows.end(), [value](std::uint16_t row) { return row == value; });
+  };
+  const std::uint32_t position = position_of(block);
+  std::int32_t& kind = kind_[position];
+  const std::int32_t uniform = all(places.known, 0xFFFF)  ? kKnown
+                               : all(places.open, 0xFFFF) ? kOpen
+                               : all(places.known, 0) && all(places.open, 0) ? kClosed
+                                                                             : 0;
+  if (uniform < 0) {
+    if (kind >= 0) free_[free_count_++] = static_cast<std::uint32_t>(kind);
+    kind = uniform;
+    return;
+  }
+  Block* b = take(position);
+  if (b == nullptr) return;
+  number_rooms(places, b->rooms);
+}
+
+void WayMemory::find_doors(const Cell& block) noexcept {
+  const std::int32_t kind = kind_[position_of(block)];
+  if (kind < 0) return;
+  Block& b = block_[static_cast<std::size_t>(kind)];
+  for (std::size_t face = 0; face < kFaces; ++face) find_face_doors(b, block, face);
+  find_inner_doors(b);
+}
+
+void WayMemory::find_face_doors(Block& b, const Cell& block, std::size_t face) noexcept {
+  b.doors[face] = 0;
+  const std::int32_t side = face % 2 == 0 ? 15 : 0;
+  const std::int32_t by = face % 2 == 0 ? 1 : -1;
+  struct Pair {
+    int count, u, v;
+  };
+  std::array<Pair, std::size_t{kRooms} * kRooms> pair{};
+  const auto cell = [face, side](int u, int v) {
+    return face / 2 == 0 ? Cell{side, u, v} : face / 2 == 1 ? Cell{u, side, v} : Cell{u, v, side};
+  };
+  const auto rooms_at = [&](int u, int v) {
+    const Cell c = cell(u, v);
+    const unsigned room = b.rooms.at(c.x, c.y, c.z);
+    const Cell next{kBlockCells * block.x + c.x + (face / 2 == 0 ? by : 0),
+                    kBlockCells * block.y + c.y + (face / 2 == 1 ? by : 0),
+                    kBlockCells * block.z + c.z + (face / 2 == 2 ? by : 0)};
+    const unsigned other = room == 0 ? 0 : room_at(next);
+    return other == 0 ? 0U : kRooms * room + other;
+  };
+  std::array<std::uint8_t, 256> at{};
+  for (int i = 0; i < 256; ++i) {
+    const unsigned rooms = rooms_at(i % 16, i / 16);
+    at[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(rooms);
+    Pair& p = pair[rooms];
+    ++p.count;
+    p.u += i % 16;
+    p.v += i / 16;
+  }
+  for (unsigned rooms = 1; rooms < pair.size() && b.doors[face] < kDoorsPerFace; ++rooms) {
+    const Pair& p = pair[rooms];
+    if (p.count == 0) continue;
+    // Of its places the one nearest to the middle.
+    int best = 1 << 30, best_at = 0;
+    for (int i = 0; i < 256; ++i) {
+      if (at[static_cast<std::size_t>(i)] != rooms) continue;
+      const int du = p.count * (i % 16) - p.u, dv = p.count * (i / 16) - p.v;
+      if (du * du + dv * dv < best) best = du * du + dv * dv, best_at = i;
+    }
+    const Cell c = cell(best_at % 16, best_at / 16);
+    b.door[face][b.doors[face]++] = {static_cast<std::uint8_t>(rooms / kRooms), static_cast<std::uint8_t>(rooms % kRooms),
+                                     static_cast<std::uint8_t>(c.x), static_cast<std::uint8_t>(c.y),
+                                     static_cast<std::uint8_t>(c.z)};
+  }
+}
+
+void WayMemory::find_inner_doors(Block& b) noexcept {
+  b.doors[kInside] = 0;
+  struct Pair {
+    int count, x, y, z;
+  };
+  std::array<Pair, std::size_t{kFirstOpenRoom} * kFirstOpenRoom> pair{};
+  const auto for_each = [&b](const auto& what) {
+    for (std::int32_t i = 0; i < 256; ++i) {
+      if (b.rooms.number[static_cast<std::size_t>(i)] == 0) continue;
+      const std::int32_t y = i % 16, z = i / 16;
+      for (std::int32_t x = 0; x < 16; ++x) {
+        const unsigned room = b.rooms.at(x, y, z);
+        if (!is_known_room(room)) continue;
+        const auto beside = [&](std::int32_t nx, std::int32_t ny, std::int32_t nz) {
+          if (((nx | ny | nz) & ~15) != 0) return;
+          const unsigned other = b.rooms.at(nx, ny, nz);
+          if (other >= kFirstOpenRoom) what(room * kFirstOpenRoom + other - kFirstOpenRoom, x, y, z);
+        };
+        beside(x + 1, y, z), beside(x - 1, y, z), beside(x, y + 1, z), beside(x, y - 1, z), beside(x, y, z + 1),
+            beside(x, y, z - 1);
+      }
+    }
+  };
+  for_each([&pair](unsigned rooms, int x, int y, int z) {
+    Pair& p = pair[rooms];
+    ++p.count, p.x += x, p.y += y, p.z += z;
+  });
+  std::array<int, pair.size()> best{};
+  std::array<Door, pair.size()> door{};
+  best.fill(1 << 30);
+  for_each([&](unsigned rooms, int x, int y, int z) {
+    const Pair& p = pair[rooms];
+    const int dx = x - p.x / p.count, dy = y - p.y / p.count, dz = z - p.z / p.count;
+    const int away = dx * dx + dy * dy + dz * dz;
+    if (away >= best[rooms]) return;
+    best[rooms] = away;
+    door[rooms] = {static_cast<std::uint8_t>(rooms / kFirstOpenRoom),
+                   static_cast<std::uint8_t>(rooms % kFirstOpenRoom + kFirstOpenRoom), static_cast<std::uint8_t>(x),
+                   static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(z)};
+  });
+  for (std::size_t i = 0; i < pair.size() && b.doors[kInside] < kDoorsPerFace; ++i) {
+    if (pair[i].count > 0) b.door[kInside][b.doors[kInside]++] = door[i];
+  }
+}
+
+}  // namespace roborun::stages

@@ -1,0 +1,130 @@
+/// What the vehicle has seen of the ways to its goal: where it fits, what is not known yet, and the least way through
+/// both. Dead ends are left by it, and it proves it when there is no way.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "core/executive/stage_budget.hpp"
+#include "core/geometry/fence.hpp"
+#include "core/geometry/vector.hpp"
+#include "core/memory/arena.hpp"
+#include "firmware_if/status.hpp"
+#include "stages/perception/map_view.hpp"
+#include "stages/planning/way_rooms.hpp"
+
+namespace roborun::stages {
+
+/// Space is divided into blocks of 4.8 m, and the places of a vehicle inside each into rooms: connected places that are
+/// known to be free, or that may be. Doors join rooms of neighbouring blocks, and known with open ones. What was seen
+/// stays, whatever the map gives up. The search runs from the goal over rooms, known space at its length and open space
+/// at kUnknownWeight times its length, until it comes to the vehicle. Exact in what is connected (at 0.3 m), coarse in
+/// lengths. Source: Dijkstra (1959), over the regions of Botea, Mueller, Schaeffer, "Near optimal hierarchical
+/// path-finding" (2004).
+class WayMemory {
+ public:
+  struct Config {
+    Aabb bounds_W{};  ///< The vehicle's centre stays inside.
+    double radius_m{0.85};
+    core::Fence fence{};
+    std::size_t max_blocks{9100};  ///< That are neither free all over nor unknown all over.
+  };
+  [[nodiscard]] static std::size_t arena_bytes(const Config& config) noexcept;
+  WayMemory(const Config& config, core::Arena& arena) noexcept;
+
+  /// Reads what the map knows now within `reach_m` of a place. kOk or kBudgetSpent: the rest stays as it was.
+  Status look(const MapView& map, const Vector3& p_W, double reach_m, core::StageBudget& budget,
+              core::Work& work) noexcept;
+  /// The ways to the goal from everywhere that is not farther from it than the vehicle. kOk; kNoPath: there is none, as
+  /// far as is known now; kStartBlocked, kGoalBlocked: no place of the vehicle is near; kBudgetSpent: no answer.
+  Status solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget, core::Work& work) noexcept;
+
+  /// Metres of known way, after solve(); +inf where it did not come.
+  [[nodiscard]] double to_goal_m(const Vector3& p_W) const noexcept;
+  /// The way from a place: corners in known space one after the other, no farther than `within_m` from it, the last one
+  /// where unknown space begins or the goal itself. Returns how many were written.
+  [[nodiscard]] std::size_t known_way(const Vector3& from_W, double within_m, std::span<Vector3> way_W) const noexcept;
+
+ private:
+  struct Cell {
+    std::int32_t x, y, z;
+  };
+  /// From a room of this block to one of the block beyond a face, or (kInside) from a known to an open one.
+  struct Door {
+    std::uint8_t room{}, other{};
+    std::uint8_t x{}, y{}, z{};  ///< A place of `room` beside it.
+  };
+  static constexpr std::size_t kFaces = 6, kInside = 6;
+  static constexpr std::size_t kDoorsPerFace = 6;
+  struct Block {
+    WayRooms rooms{};
+    std::array<std::array<Door, kDoorsPerFace>, kFaces + 1> door{};
+    std::array<std::uint8_t, kFaces + 1> doors{};
+    std::uint32_t position{};
+  };
+  /// All of one kind, or the index of a Block.
+  static constexpr std::int32_t kOpen = -1, kKnown = -2, kClosed = -3;
+  static constexpr std::uint32_t kFar = 0xFFFFFFFFU;
+  static constexpr std::uint32_t kNowhere = 0xFFFFFFFFU;
+  struct Node {
+    std::uint32_t cost{kFar};
+    std::uint32_t next{kNowhere};  ///< Towards the goal.
+    Cell entry{};                  ///< Place from which the next one is entered.
+    bool settled{};
+  };
+  struct Window;  // of a look
+
+  [[nodiscard]] std::uint32_t position_of(const Cell& block) const noexcept {
+    return static_cast<std::uint32_t>((block.z * size_.y + block.y) * size_.x + block.x);
+  }
+  [[nodiscard]] Cell block_at(std::uint32_t position) const noexcept {
+    const auto p = static_cast<std::int32_t>(position);
+    return {p % size_.x, (p / size_.x) % size_.y, p / (size_.x * size_.y)};
+  }
+  [[nodiscard]] bool has(const Cell& block) const noexcept {
+    return block.x >= 0 && block.y >= 0 && block.z >= 0 && block.x < size_.x && block.y < size_.y && block.z < size_.z;
+  }
+  [[nodiscard]] Cell place_of(const Vector3& p_W) const noexcept;
+  [[nodiscard]] Vector3 at_W(const Cell& place) const noexcept;
+  [[nodiscard]] unsigned room_at(const Cell& place) const noexcept;
+  /// The nearest place that is not closed (known, if there is one), at most two cells away.
+  [[nodiscard]] bool nearest_room(const Vector3& p_W, Cell& place) const noexcept;
+  [[nodiscard]] std::uint32_t node_of(std::uint32_t position, unsigned room) const noexcept;
+  [[nodiscard]] bool read(const MapView& map, const Cell& low, const Cell& high, core::StageBudget& budget,
+                          core::Work& work) noexcept;
+  void renew(const Cell& block, const WayCells& cells) noexcept;
+  void forbid(const Cell& block, WayPlaces& places) const noexcept;
+  void find_doors(const Cell& block) noexcept;
+  void find_face_doors(Block& b, const Cell& block, std::size_t face) noexcept;
+  void find_inner_doors(Block& b) noexcept;
+  [[nodiscard]] Block* take(std::uint32_t position) noexcept;
+
+  [[nodiscard]] bool seed(const Vector3& goal_W) noexcept;
+  void reach(std::uint32_t node, std::uint32_t cost, std::uint32_t next, const Cell& entry) noexcept;
+  void relax(std::uint32_t node) noexcept;
+  void relax_uniform(std::uint32_t node, const Cell& block, unsigned room) noexcept;
+  void relax_rooms(std::uint32_t node, const Block& b, unsigned room) noexcept;
+  [[nodiscard]] std::uint32_t step_cost(const Cell& from, const Cell& to, unsigned room) const noexcept;
+
+  Config config_;
+  int width_;  ///< Of the vehicle, in cells.
+  Cell corner_{};  ///< First cell of the first block, in cells from the world's origin.
+  Cell size_{};    ///< Blocks.
+  std::span<std::int32_t> kind_;
+  std::span<std::uint64_t> digest_;  ///< Of the cells that a position's places touch, when it was last looked at.
+  std::span<Block> block_;
+  std::span<std::uint32_t> free_;
+  std::size_t free_count_{};
+  std::span<CellBlock> window_;
+  std::span<BlockContent> window_content_;
+  std::span<std::uint64_t> window_digest_;
+  std::span<Node> node_;  ///< Those of positions, then kRooms of each block.
+  std::span<std::uint64_t> heap_;
+  std::size_t heap_count_{};
+  bool overflown_{};
+  Cell seen_low_{0, 0, 0}, seen_high_{-1, -1, -1};  ///< Of all blocks looked at.
+  Cell low_{}, high_{};                             ///< What the search runs in.
+};
+
+}  // namespace roborun::stages

@@ -1,0 +1,193 @@
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "stages/planning/planner.hpp"
+#include "stages/planning/way_memory.hpp"
+
+namespace roborun::stages {
+namespace {
+
+constexpr double kUnit_m = 0.01;  // of costs
+constexpr std::uint32_t kPollEvery = 256;
+constexpr std::uint32_t kBeyond = 3000;  // units of cost that the search runs on beyond the vehicle
+constexpr std::array<std::array<std::int32_t, 3>, 6> kStep{
+    {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
+
+}  // namespace
+
+std::uint32_t WayMemory::step_cost(const Cell& from, const Cell& to, unsigned room) const noexcept {
+  const double length_m = kFinestCell_m * Vector3(from.x - to.x, from.y - to.y, from.z - to.z).norm();
+  return static_cast<std::uint32_t>(length_m / kUnit_m * (is_known_room(room) ? 1.0 : kUnknownWeight) + 0.5);
+}
+
+void WayMemory::reach(std::uint32_t node, std::uint32_t cost, std::uint32_t next, const Cell& entry) noexcept {
+  Node& n = node_[node];
+  if (n.settled || cost >= n.cost) return;
+  if (heap_count_ == heap_.size()) {
+    overflown_ = true;
+    return;
+  }
+  n.cost = cost;
+  n.next = next;
+  n.entry = entry;
+  heap_[heap_count_++] = (std::uint64_t{cost} << 32U) | node;
+  std::push_heap(heap_.begin(), heap_.begin() + static_cast<std::ptrdiff_t>(heap_count_), std::greater<>());
+}
+
+void WayMemory::relax_uniform(std::uint32_t node, const Cell& block, unsigned room) noexcept {
+  const Node& n = node_[node];
+  for (std::size_t face = 0; face < kFaces; ++face) {
+    const Cell next{block.x + kStep[face][0], block.y + kStep[face][1], block.z + kStep[face][2]};
+    if (next.x < low_.x || next.y < low_.y || next.z < low_.z || next.x > high_.x || next.y > high_.y || next.z > high_.z)
+      continue;
+    const std::uint32_t position = position_of(next);
+    const std::int32_t kind = kind_[position];
+    const Cell corner{kBlockCells * next.x, kBlockCells * next.y, kBlockCells * next.z};
+    if (kind == kClosed) continue;
+    if (kind < 0) {
+      // The middle of their common face.
+      const auto middle = [face](std::size_t axis, std::int32_t c) {
+        return c + (face / 2 != axis ? 8 : face % 2 == 0 ? 0 : 15);
+      };
+      const Cell door{middle(0, corner.x), middle(1, corner.y), middle(2, corner.z)};
+      reach(position, n.cost + step_cost(n.entry, door, room), node, door);
+      continue;
+    }
+    const Block& b = block_[static_cast<std::size_t>(kind)];
+    const std::size_t back = face ^ 1U;
+    for (std::size_t i = 0; i < b.doors[back]; ++i) {
+      const Door& d = b.door[back][i];
+      const Cell door{corner.x + d.x, corner.y + d.y, corner.z + d.z};
+      reach(node_of(position, d.room), n.cost + step_cost(n.entry, door, room), node, door);
+    }
+  }
+}
+
+void WayMemory::relax_rooms(std::uint32_t node, const Block& b, unsigned room) noexcept {
+  const Node& n = node_[node];
+  const Cell block = block_at(b.position);
+  const Cell corner{kBlockCells * block.x, kBlockCells * block.y, kBlockCells * block.z};
+  for (std::size_t face = 0; face < kFaces; ++face) {
+    const auto& by = kStep[face];
+    const Cell next{block.x + by[0], block.y + by[1], block.z + by[2]};
+    if (next.x < low_.x || next.y < low_.y || next.z < low_.z || next.x > high_.x || next.y > high_.y || next.z > high_.z)
+      continue;
+    for (std::size_t i = 0; i < b.doors[face]; ++i) {
+      const Door& d = b.door[face][i];
+      if (d.room != room) continue;
+      const Cell door{corner.x + d.x + by[0], corner.y + d.y + by[1], corner.z + d.z + by[2]};
+      reach(node_of(position_of(next), d.other), n.cost + step_cost(n.entry, door, room), node, door);
+    }
+  }
+  for (std::size_t i = 0; i < b.doors[kInside]; ++i) {
+    const Door& d = b.door[kInside][i];
+    if (d.room != room && d.other != room) continue;
+    const Cell door{corner.x + d.x, corner.y + d.y, corner.z + d.z};
+    const unsigned other = d.room == room ? d.other : d.room;
+    reach(node_of(b.position, other), n.cost + step_cost(n.entry, door, room), node, door);
+  }
+}
+
+void WayMemory::relax(std::uint32_t node) noexcept {
+  if (node < kind_.size())
+    return relax_uniform(node, block_at(node), kind_[node] == kKnown ? 1U : kFirstOpenRoom);
+  const std::size_t index = node - kind_.size();
+  relax_rooms(node, block_[index / kRooms], static_cast<unsigned>(index % kRooms));
+}
+
+bool WayMemory::seed(const Vector3& goal_W) noexcept {
+  Cell goal{};
+  const bool near = nearest_room(goal_W, goal);
+  const Cell block{goal.x >> 4, goal.y >> 4, goal.z >> 4};
+  const bool inside = near && block.x >= low_.x && block.y >= low_.y && block.z >= low_.z && block.x <= high_.x &&
+                      block.y <= high_.y && block.z <= high_.z;
+  if (inside) {
+    reach(node_of(position_of(block), room_at(goal)), 0, kNowhere, goal);
+    return true;
+  }
+  // From where the search ends, straight on.
+  bool any = false;
+  for (std::int32_t z = low_.z; z <= high_.z; ++z) {
+    for (std::int32_t y = low_.y; y <= high_.y; ++y) {
+      for (std::int32_t x = low_.x; x <= high_.x; ++x) {
+        const bool border = (x == low_.x && x > 0) || (y == low_.y && y > 0) || (z == low_.z && z > 0) ||
+                            (x == high_.x && x < size_.x - 1) || (y == high_.y && y < size_.y - 1) ||
+                            (z == high_.z && z < size_.z - 1);
+        if (!border) {
+          if (z > low_.z && z < high_.z && y > low_.y && y < high_.y && x > low_.x) x = high_.x - 1;
+          continue;
+        }
+        const std::uint32_t position = position_of({x, y, z});
+        if (kind_[position] != kOpen) continue;
+        const Cell middle{kBlockCells * x + 8, kBlockCells * y + 8, kBlockCells * z + 8};
+        const double rest_m = kUnknownWeight * (goal_W - at_W(middle)).norm();
+        reach(position, static_cast<std::uint32_t>(std::fmin(rest_m / kUnit_m, 4e8)), kNowhere, middle);
+        any = true;
+      }
+    }
+  }
+  return any;
+}
+
+Status WayMemory::solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
+                        core::Work& work) noexcept {
+  if (seen_low_.x > seen_high_.x) return Status::kNotReady;
+  low_ = {std::max(seen_low_.x - 1, 0), std::max(seen_low_.y - 1, 0), std::max(seen_low_.z - 1, 0)};
+  high_ = {std::min(seen_high_.x + 1, size_.x - 1), std::min(seen_high_.y + 1, size_.y - 1),
+           std::min(seen_high_.z + 1, size_.z - 1)};
+  std::fill(node_.begin(), node_.end(), Node{});
+  heap_count_ = 0;
+  overflown_ = false;
+  Cell start{};
+  if (!nearest_room(from_W, start)) return Status::kStartBlocked;
+  const std::uint32_t first = node_of(position_of({start.x >> 4, start.y >> 4, start.z >> 4}), room_at(start));
+  if (!seed(goal_W)) return Status::kGoalBlocked;
+  std::uint32_t until = kFar;
+  for (std::uint32_t i = 1; heap_count_ > 0; ++i) {
+    if (i % kPollEvery == 0 && budget.spent(work)) return Status::kBudgetSpent;
+    std::pop_heap(heap_.begin(), heap_.begin() + static_cast<std::ptrdiff_t>(heap_count_), std::greater<>());
+    const std::uint64_t entry = heap_[--heap_count_];
+    const auto node = static_cast<std::uint32_t>(entry);
+    if (entry >> 32U > until) break;
+    if (node_[node].settled) continue;
+    node_[node].settled = true;
+    work.units += 1;
+    if (node == first) until = node_[node].cost + kBeyond;
+    relax(node);
+  }
+  if (node_[first].settled) return Status::kOk;
+  return overflown_ ? Status::kBudgetSpent : Status::kNoPath;
+}
+
+double WayMemory::to_goal_m(const Vector3& p_W) const noexcept {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Cell place{};
+  if (!nearest_room(p_W, place)) return kInfinity;
+  const unsigned room = room_at(place);
+  const Node& n = node_[node_of(position_of({place.x >> 4, place.y >> 4, place.z >> 4}), room)];
+  if (!n.settled) return kInfinity;
+  return kUnit_m * n.cost + (at_W(n.entry) - p_W).norm() * (is_known_room(room) ? 1.0 : kUnknownWeight);
+}
+
+std::size_t WayMemory::known_way(const Vector3& from_W, double within_m, std::span<Vector3> way_W) const noexcept {
+  Cell place{};
+  if (!nearest_room(from_W, place)) return 0;
+  unsigned room = room_at(place);
+  std::uint32_t node = node_of(position_of({place.x >> 4, place.y >> 4, place.z >> 4}), room);
+  std::size_t count = 0;
+  while (count < way_W.size() && node_[node].settled) {
+    const bool known = node < kind_.size() ? kind_[node] == kKnown
+                                           : is_known_room(static_cast<unsigned>((node - kind_.size()) % kRooms));
+    if (!known) break;
+    const Vector3 at = at_W(node_[node].entry);
+    if ((at - from_W).norm() > within_m) break;
+    way_W[count++] = at;
+    if (node_[node].next == kNowhere) break;
+    node = node_[node].next;
+  }
+  return count;
+}
+
+}  // namespace roborun::stages

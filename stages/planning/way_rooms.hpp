@@ -1,0 +1,39 @@
+/// Where a vehicle fits inside one block of the map: its rooms, connected places of one kind.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "stages/perception/cell_block.hpp"
+
+namespace roborun::stages {
+
+/// A place (x, y, z) of a block is that of a vehicle `width` cells wide whose box begins with this cell. Known: all its
+/// cells are free. Open: none is occupied, some unknown. Anything else is closed.
+/// Rooms 1 .. 7 are known, 8 .. 15 open; 0 is closed. What is more than fits the numbers joins the last one.
+inline constexpr unsigned kFirstOpenRoom = 8;
+inline constexpr unsigned kRooms = 16;
+[[nodiscard]] constexpr bool is_known_room(unsigned room) noexcept { return room > 0 && room < kFirstOpenRoom; }
+
+struct WayRooms {
+  std::array<std::uint64_t, 256> number{};  ///< Of place x in row 16 z + y, in bits 4 x and up.
+  [[nodiscard]] unsigned at(std::int32_t x, std::int32_t y, std::int32_t z) const noexcept {
+    return static_cast<unsigned>(number[static_cast<std::size_t>(16 * z + y)] >> (4 * x)) & 15U;
+  }
+};
+
+/// A block and the seven that follow it in x, y, z (bit 0, 1, 2 of the index): their cells. Null: all of one kind.
+struct WayCells {
+  std::array<const CellBlock*, 8> block{};
+  std::array<BlockContent, 8> content{};
+};
+
+/// The rows of places of a block that are known and those that are open. width 1 .. 17.
+struct WayPlaces {
+  CellRows known{}, open{};
+};
+void find_places(const WayCells& cells, int width, WayPlaces& places) noexcept;
+/// Numbers the rooms. RT-safe: O(rooms * 256 * 16).
+void number_rooms(const WayPlaces& places, WayRooms& rooms) noexcept;
+
+}  // namespace roborun::stages
