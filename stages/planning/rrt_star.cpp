@@ -73,7 +73,7 @@ RrtStar::RrtStar(const Config& config, core::Arena& arena) noexcept
 }
 
 double RrtStar::promise_m(const Node& node, const PlanRequest& request) const noexcept {
-  if (request.ways != nullptr) return node.cost_m + request.ways->to_goal_m(node.p_W);
+  if (request.ways != nullptr) return node.cost_m + kUnknownWeight * request.ways->to_goal_m(node.p_W);
   return node.cost_m + kUnknownWeight * (request.goal_W - node.p_W).norm();
 }
 
@@ -331,7 +331,7 @@ bool RrtStar::follow_ways(Search& s, const MapView& map, double below_m, PlanRes
   std::array<Vector3, kMaxWaypoints> way_W;
   const std::size_t count = s.request.ways->known_way(s.request.start_W, s.request.horizon_m - 1.0, way_W);
   for (std::size_t i = count; i-- > 0;) {
-    const double rest_m = s.request.ways->to_goal_m(way_W[i]);
+    const double rest_m = kUnknownWeight * s.request.ways->to_goal_m(way_W[i]);
     if ((way_W[i] - s.request.start_W).norm() < 1.0 || !((way_W[i] - s.request.start_W).norm() + rest_m < below_m)) continue;
     PlanRequest request = s.request;
     request.goal_W = way_W[i];
