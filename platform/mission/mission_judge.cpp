@@ -11,6 +11,7 @@ constexpr double kHover_mps = 0.3;
 constexpr double kOwnApproach_mps = 0.3;  // less is swaying on the spot
 constexpr double kHolding_s = 5.0;        // of hovering, until a hold counts as the end
 constexpr double kHardTouchdown_mps = 2.0;
+constexpr double kMoved_m = 5.0;  // a way around may lead away from the goal
 constexpr double kGiveUpAfter_s = 60.0;  // what cannot even stop
 
 }  // namespace
@@ -74,8 +75,9 @@ const char* MissionJudge::judge(MonotonicTime now) {
   if (to_goal_m < kReached_m && s.v_WB.norm() < kReachedSpeed_mps) {
     return "reached_goal";
   }
-  if (to_goal_m < best_distance_m_ - 0.5) {
-    best_distance_m_ = to_goal_m;
+  if (to_goal_m < best_distance_m_ - 0.5 || (s.p_WB - moved_to_W_).norm() > kMoved_m) {
+    best_distance_m_ = std::min(best_distance_m_, to_goal_m);
+    moved_to_W_ = s.p_WB;
     best_at_ = now;
   }
   if (s.battery_ratio <= 0.0) return "battery_empty";

@@ -14,7 +14,8 @@ constexpr std::size_t kHeap = 1U << 17U;
 constexpr std::int32_t kWindow = 13, kWindowHeight = 9;  // blocks of one look, and one more for the widths
 constexpr std::size_t kWindowBlocks =
     static_cast<std::size_t>(kWindow + 1) * (kWindow + 1) * (kWindowHeight + 1);
-constexpr std::int32_t kOutside = 0;
+constexpr double kMost_m = 1e5;
+constexpr std::uint64_t kWorkOfABlock = 64;  // lookups that a block that changed counts as
 
 std::int32_t whole(double x) noexcept { return static_cast<std::int32_t>(std::floor(x)); }
 
@@ -92,7 +93,7 @@ unsigned WayMemory::room_at(const Cell& place) const noexcept {
 }
 
 bool WayMemory::nearest_room(const Vector3& p_W, Cell& place) const noexcept {
-  if (!is_finite(p_W) || !(p_W.cwiseAbs().maxCoeff() < 1e5)) return false;
+  if (!is_finite(p_W) || !(p_W.cwiseAbs().maxCoeff() < kMost_m)) return false;
   const Cell at = place_of(p_W);
   int best = 1000;
   for (std::int32_t dz = -2; dz <= 2; ++dz) {
@@ -127,79 +128,74 @@ WayMemory::Block* WayMemory::take(std::uint32_t position) noexcept {
   return &block;
 }
 
-Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, core::StageBudget& budget,
-                       core::Work& work) noexcept {
-  const Cell at = place_of(p_W);
-  const auto blocks = static_cast<std::int32_t>(std::ceil(reach_m / kBlock_m));
-  const std::int32_t side = std::min(blocks, (kWindow - 1) / 2), up = std::min(blocks, (kWindowHeight - 1) / 2);
-  const Cell low{std::max((at.x >> 4) - side, kOutside), std::max((at.y >> 4) - side, kOutside),
-                 std::max((at.z >> 4) - up, kOutside)};
-  const Cell high{std::min((at.x >> 4) + side, size_.x - 1), std::min((at.y >> 4) + side, size_.y - 1),
-                  std::min((at.z >> 4) + up, size_.z - 1)};
-  if (low.x > high.x || low.y > high.y || low.z > high.z) return Status::kInvalidArgument;
-  return read(map, low, high, budget, work) ? Status::kOk : Status::kBudgetSpent;
-}
-
-bool WayMemory::read(const MapView& map, const Cell& low, const Cell& high, core::StageBudget& budget,
-                     core::Work& work) noexcept {
-  // One block more to the far sides: vehicles reach into it.
-  const Cell wide{high.x - low.x + 2, high.y - low.y + 2, high.z - low.z + 2};
-  const auto index = [&wide](std::int32_t x, std::int32_t y, std::int32_t z) {
-    return static_cast<std::size_t>((z * wide.y + y) * wide.x + x);
-  };
-  for (std::int32_t z = 0; z < wide.z; ++z) {
-    for (std::int32_t y = 0; y < wide.y; ++y) {
+bool WayMemory::read_window(const MapView& map, const Cell& low, const Cell& high, core::StageBudget& budget,
+                            core::Work& work) noexcept {
+  std::size_t i = 0;
+  for (std::int32_t z = low.z; z <= high.z + 1; ++z) {
+    for (std::int32_t y = low.y; y <= high.y + 1; ++y) {
       if (budget.spent(work)) return false;
-      for (std::int32_t x = 0; x < wide.x; ++x) {
-        const std::size_t i = index(x, y, z);
-        const Vector3 corner_W = kFinestCell_m * Vector3(corner_.x + kBlockCells * (low.x + x),
-                                                         corner_.y + kBlockCells * (low.y + y),
-                                                         corner_.z + kBlockCells * (low.z + z));
+      for (std::int32_t x = low.x; x <= high.x + 1; ++x, ++i) {
+        const Vector3 corner_W =
+            kFinestCell_m *
+            Vector3(corner_.x + kBlockCells * x, corner_.y + kBlockCells * y, corner_.z + kBlockCells * z);
         window_content_[i] = map.read(corner_W, window_[i], work.units);
-        window_digest_[i] = window_content_[i] == BlockContent::kMixed ? digest_of(window_[i]) | 4U
-                                                                       : static_cast<std::uint64_t>(window_content_[i]);
+        window_digest_[i] = window_content_[i] == BlockContent::kMixed
+                                ? digest_of(window_[i])
+                                : static_cast<std::uint64_t>(window_content_[i]);
       }
     }
   }
+  return true;
+}
+
+std::uint64_t WayMemory::cells_at(const Cell& block, const Cell& low, const Cell& high,
+                                  WayCells& cells) const noexcept {
+  const std::int32_t wide_x = high.x - low.x + 2, wide_y = high.y - low.y + 2;
+  std::uint64_t digest = 0;
+  for (std::int32_t i = 0; i < 8; ++i) {
+    const std::int32_t x = block.x - low.x + (i & 1), y = block.y - low.y + ((i >> 1) & 1), z = block.z - low.z + (i >> 2);
+    const auto w = static_cast<std::size_t>((z * wide_y + y) * wide_x + x);
+    cells.block[static_cast<std::size_t>(i)] = &window_[w];
+    cells.content[static_cast<std::size_t>(i)] = window_content_[w];
+    digest = core::mix64(digest + window_digest_[w] + 1);
+  }
+  return digest;
+}
+
+Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, core::StageBudget& budget,
+                       core::Work& work) noexcept {
+  if (!is_finite(p_W) || !(p_W.cwiseAbs().maxCoeff() < kMost_m)) return Status::kInvalidArgument;
+  const Cell at = place_of(p_W);
+  const auto blocks = static_cast<std::int32_t>(std::ceil(std::fmin(reach_m, kMost_m) / kBlock_m));
+  const std::int32_t side = std::min(blocks, (kWindow - 1) / 2), up = std::min(blocks, (kWindowHeight - 1) / 2);
+  const Cell low{std::max((at.x >> 4) - side, 0), std::max((at.y >> 4) - side, 0), std::max((at.z >> 4) - up, 0)};
+  const Cell high{std::min((at.x >> 4) + side, size_.x - 1), std::min((at.y >> 4) + side, size_.y - 1),
+                  std::min((at.z >> 4) + up, size_.z - 1)};
+  if (low.x > high.x || low.y > high.y || low.z > high.z) return Status::kInvalidArgument;
+  if (!read_window(map, low, high, budget, work)) return Status::kBudgetSpent;
   if (seen_low_.x > seen_high_.x) seen_low_ = low, seen_high_ = high;
   seen_low_ = {std::min(seen_low_.x, low.x), std::min(seen_low_.y, low.y), std::min(seen_low_.z, low.z)};
   seen_high_ = {std::max(seen_high_.x, high.x), std::max(seen_high_.y, high.y), std::max(seen_high_.z, high.z)};
-  std::array<Cell, 512> changed{};
-  std::size_t count = 0;
+  std::size_t changed = 0;
+  bool spent = false;
   for (std::int32_t z = low.z; z <= high.z; ++z) {
     for (std::int32_t y = low.y; y <= high.y; ++y) {
       for (std::int32_t x = low.x; x <= high.x; ++x) {
         WayCells cells;
-        std::uint64_t digest = 0;
-        for (std::int32_t i = 0; i < 8; ++i) {
-          const std::size_t w = index(x - low.x + (i & 1), y - low.y + ((i >> 1) & 1), z - low.z + (i >> 2));
-          cells.block[static_cast<std::size_t>(i)] = &window_[w];
-          cells.content[static_cast<std::size_t>(i)] = window_content_[w];
-          digest = core::mix64(digest + window_digest_[w] + 1);
-        }
+        const std::uint64_t digest = cells_at({x, y, z}, low, high, cells);
         std::uint64_t& before = digest_[position_of({x, y, z})];
         if (before == digest) continue;
-        if (count == changed.size() || budget.spent(work)) break;
+        work.units += kWorkOfABlock;
+        spent = spent || changed == changed_.size() || budget.spent(work);
+        if (spent) continue;
         before = digest;
         renew({x, y, z}, cells);
-        changed[count++] = {x, y, z};
+        changed_[changed++] = {x, y, z};
       }
     }
   }
-  // Their doors, and those of their neighbours to them.
-  for (std::size_t i = 0; i < count; ++i) {
-    find_doors(changed[i]);
-    for (std::size_t face = 0; face < kFaces; ++face) {
-      const std::int32_t by = face % 2 == 0 ? 1 : -1;
-      const Cell next{changed[i].x + (face / 2 == 0 ? by : 0), changed[i].y + (face / 2 == 1 ? by : 0),
-                      changed[i].z + (face / 2 == 2 ? by : 0)};
-      if (!has(next)) continue;
-      const std::int32_t kind = kind_[position_of(next)];
-      if (kind >= 0) find_face_doors(block_[static_cast<std::size_t>(kind)], next, face ^ 1U);
-    }
-  }
-  work.units += 64 * count;
-  return true;
+  for (std::size_t i = 0; i < changed; ++i) find_doors(changed_[i]);
+  return spent ? Status::kBudgetSpent : Status::kOk;
 }
 
 void WayMemory::forbid(const Cell& block, WayPlaces& places) const noexcept {
@@ -246,10 +242,15 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
 
 void WayMemory::find_doors(const Cell& block) noexcept {
   const std::int32_t kind = kind_[position_of(block)];
-  if (kind < 0) return;
-  Block& b = block_[static_cast<std::size_t>(kind)];
-  for (std::size_t face = 0; face < kFaces; ++face) find_face_doors(b, block, face);
-  find_inner_doors(b);
+  if (kind >= 0) find_inner_doors(block_[static_cast<std::size_t>(kind)]);
+  for (std::size_t face = 0; face < kFaces; ++face) {
+    if (kind >= 0) find_face_doors(block_[static_cast<std::size_t>(kind)], block, face);
+    const std::int32_t by = face % 2 == 0 ? 1 : -1;
+    const Cell next{block.x + (face / 2 == 0 ? by : 0), block.y + (face / 2 == 1 ? by : 0),
+                    block.z + (face / 2 == 2 ? by : 0)};
+    const std::int32_t other = has(next) ? kind_[position_of(next)] : kClosed;
+    if (other >= 0) find_face_doors(block_[static_cast<std::size_t>(other)], next, face ^ 1U);
+  }
 }
 
 void WayMemory::find_face_doors(Block& b, const Cell& block, std::size_t face) noexcept {

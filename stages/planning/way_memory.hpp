@@ -71,9 +71,9 @@ class WayMemory {
     std::uint32_t cost{kFar};
     std::uint32_t next{kNowhere};  ///< Towards the goal.
     Cell entry{};                  ///< Place from which the next one is entered.
-    bool settled{};
+    std::uint32_t reached{};       ///< Search in which what is above was written.
+    std::uint32_t settled{};       ///< Search in which it became final.
   };
-  struct Window;  // of a look
 
   [[nodiscard]] std::uint32_t position_of(const Cell& block) const noexcept {
     return static_cast<std::uint32_t>((block.z * size_.y + block.y) * size_.x + block.x);
@@ -91,16 +91,24 @@ class WayMemory {
   /// The nearest place that is not closed (known, if there is one), at most two cells away.
   [[nodiscard]] bool nearest_room(const Vector3& p_W, Cell& place) const noexcept;
   [[nodiscard]] std::uint32_t node_of(std::uint32_t position, unsigned room) const noexcept;
-  [[nodiscard]] bool read(const MapView& map, const Cell& low, const Cell& high, core::StageBudget& budget,
-                          core::Work& work) noexcept;
+  /// The cells of blocks low .. high, and of one more to the far sides: vehicles reach into it. False: budget spent.
+  [[nodiscard]] bool read_window(const MapView& map, const Cell& low, const Cell& high, core::StageBudget& budget,
+                                 core::Work& work) noexcept;
+  /// A block of the window and the seven that follow it; returns their digest.
+  [[nodiscard]] std::uint64_t cells_at(const Cell& block, const Cell& low, const Cell& high, WayCells& cells) const noexcept;
   void renew(const Cell& block, const WayCells& cells) noexcept;
   void forbid(const Cell& block, WayPlaces& places) const noexcept;
+  /// Of a block that changed, and of its neighbours to it.
   void find_doors(const Cell& block) noexcept;
   void find_face_doors(Block& b, const Cell& block, std::size_t face) noexcept;
   void find_inner_doors(Block& b) noexcept;
   [[nodiscard]] Block* take(std::uint32_t position) noexcept;
 
   [[nodiscard]] bool seed(const Vector3& goal_W) noexcept;
+  [[nodiscard]] bool is_settled(std::uint32_t node) const noexcept { return node_[node].settled == search_; }
+  [[nodiscard]] bool in_search(const Cell& b) const noexcept {
+    return b.x >= low_.x && b.y >= low_.y && b.z >= low_.z && b.x <= high_.x && b.y <= high_.y && b.z <= high_.z;
+  }
   void reach(std::uint32_t node, std::uint32_t cost, std::uint32_t next, const Cell& entry) noexcept;
   void relax(std::uint32_t node) noexcept;
   void relax_uniform(std::uint32_t node, const Cell& block, unsigned room) noexcept;
@@ -116,10 +124,12 @@ class WayMemory {
   std::span<Block> block_;
   std::span<std::uint32_t> free_;
   std::size_t free_count_{};
+  std::array<Cell, 512> changed_{};  ///< In this look.
   std::span<CellBlock> window_;
   std::span<BlockContent> window_content_;
   std::span<std::uint64_t> window_digest_;
   std::span<Node> node_;  ///< Those of positions, then kRooms of each block.
+  std::uint32_t search_{0};
   std::span<std::uint64_t> heap_;
   std::size_t heap_count_{};
   bool overflown_{};

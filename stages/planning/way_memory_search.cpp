@@ -10,6 +10,7 @@ namespace roborun::stages {
 namespace {
 
 constexpr double kUnit_m = 0.01;  // of costs
+constexpr double kMost_m = 1e5;
 constexpr std::uint32_t kPollEvery = 256;
 constexpr std::uint32_t kBeyond = 3000;  // units of cost that the search runs on beyond the vehicle
 constexpr std::array<std::array<std::int32_t, 3>, 6> kStep{
@@ -24,14 +25,12 @@ std::uint32_t WayMemory::step_cost(const Cell& from, const Cell& to, unsigned ro
 
 void WayMemory::reach(std::uint32_t node, std::uint32_t cost, std::uint32_t next, const Cell& entry) noexcept {
   Node& n = node_[node];
-  if (n.settled || cost >= n.cost) return;
+  if (is_settled(node) || (n.reached == search_ && cost >= n.cost)) return;
   if (heap_count_ == heap_.size()) {
     overflown_ = true;
     return;
   }
-  n.cost = cost;
-  n.next = next;
-  n.entry = entry;
+  n = {cost, next, entry, search_, n.settled};
   heap_[heap_count_++] = (std::uint64_t{cost} << 32U) | node;
   std::push_heap(heap_.begin(), heap_.begin() + static_cast<std::ptrdiff_t>(heap_count_), std::greater<>());
 }
@@ -40,8 +39,7 @@ void WayMemory::relax_uniform(std::uint32_t node, const Cell& block, unsigned ro
   const Node& n = node_[node];
   for (std::size_t face = 0; face < kFaces; ++face) {
     const Cell next{block.x + kStep[face][0], block.y + kStep[face][1], block.z + kStep[face][2]};
-    if (next.x < low_.x || next.y < low_.y || next.z < low_.z || next.x > high_.x || next.y > high_.y || next.z > high_.z)
-      continue;
+    if (!in_search(next)) continue;
     const std::uint32_t position = position_of(next);
     const std::int32_t kind = kind_[position];
     const Cell corner{kBlockCells * next.x, kBlockCells * next.y, kBlockCells * next.z};
@@ -72,8 +70,7 @@ void WayMemory::relax_rooms(std::uint32_t node, const Block& b, unsigned room) n
   for (std::size_t face = 0; face < kFaces; ++face) {
     const auto& by = kStep[face];
     const Cell next{block.x + by[0], block.y + by[1], block.z + by[2]};
-    if (next.x < low_.x || next.y < low_.y || next.z < low_.z || next.x > high_.x || next.y > high_.y || next.z > high_.z)
-      continue;
+    if (!in_search(next)) continue;
     for (std::size_t i = 0; i < b.doors[face]; ++i) {
       const Door& d = b.door[face][i];
       if (d.room != room) continue;
@@ -100,10 +97,10 @@ void WayMemory::relax(std::uint32_t node) noexcept {
 bool WayMemory::seed(const Vector3& goal_W) noexcept {
   Cell goal{};
   const bool near = nearest_room(goal_W, goal);
+  if (!near) goal = place_of(goal_W);
   const Cell block{goal.x >> 4, goal.y >> 4, goal.z >> 4};
-  const bool inside = near && block.x >= low_.x && block.y >= low_.y && block.z >= low_.z && block.x <= high_.x &&
-                      block.y <= high_.y && block.z <= high_.z;
-  if (inside) {
+  if (in_search(block)) {
+    if (!near) return false;
     reach(node_of(position_of(block), room_at(goal)), 0, kNowhere, goal);
     return true;
   }
@@ -137,11 +134,12 @@ Status WayMemory::solve(const Vector3& from_W, const Vector3& goal_W, core::Stag
   low_ = {std::max(seen_low_.x - 1, 0), std::max(seen_low_.y - 1, 0), std::max(seen_low_.z - 1, 0)};
   high_ = {std::min(seen_high_.x + 1, size_.x - 1), std::min(seen_high_.y + 1, size_.y - 1),
            std::min(seen_high_.z + 1, size_.z - 1)};
-  std::fill(node_.begin(), node_.end(), Node{});
+  ++search_;
   heap_count_ = 0;
   overflown_ = false;
   Cell start{};
   if (!nearest_room(from_W, start)) return Status::kStartBlocked;
+  if (!is_finite(goal_W) || !(goal_W.cwiseAbs().maxCoeff() < kMost_m)) return Status::kInvalidArgument;
   const std::uint32_t first = node_of(position_of({start.x >> 4, start.y >> 4, start.z >> 4}), room_at(start));
   if (!seed(goal_W)) return Status::kGoalBlocked;
   std::uint32_t until = kFar;
@@ -151,13 +149,13 @@ Status WayMemory::solve(const Vector3& from_W, const Vector3& goal_W, core::Stag
     const std::uint64_t entry = heap_[--heap_count_];
     const auto node = static_cast<std::uint32_t>(entry);
     if (entry >> 32U > until) break;
-    if (node_[node].settled) continue;
-    node_[node].settled = true;
+    if (is_settled(node)) continue;
+    node_[node].settled = search_;
     work.units += 1;
     if (node == first) until = node_[node].cost + kBeyond;
     relax(node);
   }
-  if (node_[first].settled) return Status::kOk;
+  if (is_settled(first)) return Status::kOk;
   return overflown_ ? Status::kBudgetSpent : Status::kNoPath;
 }
 
@@ -167,7 +165,7 @@ double WayMemory::to_goal_m(const Vector3& p_W) const noexcept {
   if (!nearest_room(p_W, place)) return kInfinity;
   const unsigned room = room_at(place);
   const Node& n = node_[node_of(position_of({place.x >> 4, place.y >> 4, place.z >> 4}), room)];
-  if (!n.settled) return kInfinity;
+  if (n.settled != search_) return kInfinity;
   return kUnit_m * n.cost + (at_W(n.entry) - p_W).norm() * (is_known_room(room) ? 1.0 : kUnknownWeight);
 }
 
@@ -177,7 +175,7 @@ std::size_t WayMemory::known_way(const Vector3& from_W, double within_m, std::sp
   unsigned room = room_at(place);
   std::uint32_t node = node_of(position_of({place.x >> 4, place.y >> 4, place.z >> 4}), room);
   std::size_t count = 0;
-  while (count < way_W.size() && node_[node].settled) {
+  while (count < way_W.size() && is_settled(node)) {
     const bool known = node < kind_.size() ? kind_[node] == kKnown
                                            : is_known_room(static_cast<unsigned>((node - kind_.size()) % kRooms));
     if (!known) break;

@@ -38,7 +38,7 @@ test::BoxView pillar_world() {
 
 class PlannerContract : public ::testing::TestWithParam<const char*> {
  protected:
-  PlannerContract() : block_(4U << 20U), arena_(block_) {
+  PlannerContract() : block_(RrtStar::arena_bytes({})), arena_(block_) {
     if (std::string(GetParam()) == "own") {
       sut_ = std::make_unique<RrtStar>(RrtStar::Config{}, arena_);
     } else {
@@ -180,7 +180,7 @@ TEST(OmplPlanner, MeasuresOursBesideItsOwn) {
 
 class RrtStarTest : public ::testing::Test {
  protected:
-  std::vector<std::byte> block_ = std::vector<std::byte>(4U << 20U);
+  std::vector<std::byte> block_ = std::vector<std::byte>(RrtStar::arena_bytes({}));
   core::Arena arena_{block_};
   RrtStar sut_{{}, arena_};
   core::UnlimitedBudget unlimited_;

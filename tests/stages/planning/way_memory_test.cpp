@@ -1,0 +1,167 @@
+#include "stages/planning/way_memory.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "tests/support/box_view.hpp"
+#include "tests/support/no_alloc_scope.hpp"
+
+namespace roborun::stages {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+class WayMemoryTest : public ::testing::Test {
+ protected:
+  WayMemoryTest() {
+    config_.bounds_W = {Vector3(-20, -40, 1.5), Vector3(100, 40, 10)};
+    config_.radius_m = 0.9;
+    config_.max_blocks = 4000;
+    // Known around the start, unknown beyond.
+    view_.free_W = {Vector3(-25, -25, 0), Vector3(25, 25, 12)};
+  }
+  void make() {
+    block_ = std::vector<std::byte>(WayMemory::arena_bytes(config_));
+    arena_.emplace(block_);
+    sut_ = std::make_unique<WayMemory>(config_, *arena_);
+    ASSERT_FALSE(arena_->exhausted());
+  }
+  Status look_and_solve(const Vector3& from_W) {
+    EXPECT_EQ(sut_->look(view_, from_W, 26.0, unlimited_, work_), Status::kOk);
+    return sut_->solve(from_W, goal_W_, unlimited_, work_);
+  }
+  Vector3 last_known(const Vector3& from_W, double within_m = 100.0) {
+    std::array<Vector3, 64> way_W;
+    const std::size_t count = sut_->known_way(from_W, within_m, way_W);
+    return count == 0 ? from_W : way_W[count - 1];
+  }
+  void box(double x0, double y0, double x1, double y1) {
+    view_.occupied.push_back({Vector3(x0, y0, 0), Vector3(x1, y1, 20)});
+  }
+  WayMemory::Config config_;
+  test::BoxView view_;
+  std::vector<std::byte> block_;
+  std::optional<core::Arena> arena_;
+  std::unique_ptr<WayMemory> sut_;
+  core::UnlimitedBudget unlimited_;
+  core::Work work_;
+  Vector3 start_W_{0, 0, 5}, goal_W_{80, 0, 5};
+};
+
+TEST_F(WayMemoryTest, OpenSpaceIsStraightOnAndUnknownSpaceCountsTwice) {
+  make();
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  EXPECT_NEAR(sut_->to_goal_m(start_W_), 24.0 + 2.0 * 56.0, 12.0);
+  const Vector3 end_W = last_known(start_W_);
+  EXPECT_GT(end_W.x(), 18.0);
+  EXPECT_LT(std::fabs(end_W.y()), 6.0);
+}
+
+TEST_F(WayMemoryTest, LeadsAroundAWallThatIsKnown) {
+  box(10, -20, 10.6, 12);  // open at y > 12, within what is known
+  make();
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  std::array<Vector3, 64> way_W;
+  const std::size_t count = sut_->known_way(start_W_, 100.0, way_W);
+  ASSERT_GT(count, 0U);
+  double side_m = 0.0;
+  for (std::size_t i = 0; i < count; ++i) side_m = std::fmax(side_m, way_W[i].y());
+  EXPECT_GT(side_m, 12.0);
+  EXPECT_GT(way_W[count - 1].x(), 10.0) << "past it";
+}
+
+TEST_F(WayMemoryTest, LeavesADeadEnd) {
+  // A corridor with one opening, behind the vehicle.
+  box(20, -6, 20.6, 6);
+  box(-15, 6, 20.6, 6.6);
+  box(-15, -6.6, 20.6, -6);
+  make();
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  std::array<Vector3, 64> way_W;
+  const std::size_t count = sut_->known_way(start_W_, 100.0, way_W);
+  double back_m = 0.0;
+  for (std::size_t i = 0; i < count; ++i) back_m = std::fmin(back_m, way_W[i].x());
+  EXPECT_LT(back_m, -10.0) << "out of it";
+  EXPECT_GT(last_known(start_W_).x(), 20.0) << "and past it";
+  EXPECT_LT(last_known(start_W_, 10.0).x(), -2.0) << "no farther than asked for";
+}
+
+TEST_F(WayMemoryTest, ProvesThatThereIsNoWay) {
+  // Closed on all sides, floor and ceiling are the bounds.
+  box(20, -21, 20.6, 21);
+  box(-15, 20, 20.6, 20.6);
+  box(-15, -20.6, 20.6, -20);
+  make();
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk) << "open behind";
+  box(-15.6, -21, -15, 21);
+  EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath);
+  EXPECT_EQ(sut_->to_goal_m(start_W_), kInfinity);
+}
+
+TEST_F(WayMemoryTest, AFenceIsAWall) {
+  const std::array<core::FencePoint, 4> wall{{{10, -39}, {12, -39}, {12, 12}, {10, 12}}};
+  ASSERT_EQ(config_.fence.add_polygon(core::FenceSide::kKeepOut, wall), core::FenceFault::kNone);
+  make();
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  std::array<Vector3, 64> way_W;
+  const std::size_t count = sut_->known_way(start_W_, 100.0, way_W);
+  double side_m = 0.0;
+  for (std::size_t i = 0; i < count; ++i) side_m = std::fmax(side_m, way_W[i].y());
+  EXPECT_GT(side_m, 12.0);
+}
+
+TEST_F(WayMemoryTest, RemembersWhatTheMapGaveUp) {
+  box(20, -6, 20.6, 6);
+  box(-15, 6, 20.6, 6.6);
+  box(-15, -6.6, 20.6, -6);
+  make();
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  // Far away, where nothing of it is looked at again.
+  view_ = {};
+  view_.free_W = {Vector3(-25, -25, 0), Vector3(-15, 25, 12)};
+  const Vector3 away_W(-18, -12, 5);
+  ASSERT_EQ(sut_->look(view_, away_W, 4.0, unlimited_, work_), Status::kOk);
+  const Vector3 deep_W(15, 0, 5);
+  ASSERT_EQ(sut_->solve(deep_W, goal_W_, unlimited_, work_), Status::kOk);
+  EXPECT_GT(sut_->to_goal_m(deep_W), sut_->to_goal_m(start_W_) + 10.0) << "the dead end is still one";
+}
+
+TEST_F(WayMemoryTest, AGoalInsideAnObstacleIsAnswered) {
+  goal_W_ = Vector3(15, 0, 5);
+  box(10, -5, 20, 5);
+  make();
+  EXPECT_EQ(look_and_solve(start_W_), Status::kGoalBlocked);
+}
+
+TEST_F(WayMemoryTest, NotFiniteIsRefused) {
+  make();
+  EXPECT_EQ(sut_->look(view_, Vector3(NAN, 0, 0), 10.0, unlimited_, work_), Status::kInvalidArgument);
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  EXPECT_EQ(sut_->solve(Vector3(NAN, 0, 0), goal_W_, unlimited_, work_), Status::kStartBlocked);
+  EXPECT_EQ(sut_->to_goal_m(Vector3(NAN, 0, 0)), kInfinity);
+}
+
+TEST_F(WayMemoryTest, EndsWithItsBudget) {
+  class Little final : public core::StageBudget {
+   public:
+    [[nodiscard]] bool spent(const core::Work& done) noexcept override { return done.units > 100; }
+  } little;
+  make();
+  EXPECT_EQ(sut_->look(view_, start_W_, 26.0, little, work_), Status::kBudgetSpent);
+}
+
+TEST_F(WayMemoryTest, DoesNotAllocate) {
+  box(10, -20, 10.6, 12);
+  make();
+  const test::NoAllocScope scope;
+  (void)look_and_solve(start_W_);
+  EXPECT_EQ(scope.count(), 0U);
+}
+
+}  // namespace
+}  // namespace roborun::stages

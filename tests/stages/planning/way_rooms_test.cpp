@@ -1,0 +1,115 @@
+#include "stages/planning/way_rooms.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "core/random/counter_rng.hpp"
+#include "stages/perception/map_view.hpp"
+
+namespace roborun::stages {
+namespace {
+
+/// Eight blocks of cells: some blocks all free or all unknown, the others at random.
+struct Scene {
+  explicit Scene(std::uint64_t seed) {
+    core::CounterRng rng(seed, 1);
+    const double unknown = rng.uniform(0.0, 0.03), occupied = rng.uniform(0.0, 0.02);
+    for (std::size_t i = 0; i < 8; ++i) {
+      const double kind = rng.uniform();
+      cells.content[i] = kind < 0.15 ? BlockContent::kFree : kind < 0.25 ? BlockContent::kUnknown : BlockContent::kMixed;
+      cells.block[i] = &block[i];
+      for (std::size_t row = 0; row < 256; ++row) {
+        for (unsigned x = 0; x < 16; ++x) {
+          const double draw = rng.uniform();
+          const auto bit = static_cast<std::uint16_t>(1U << x);
+          if (draw < occupied) block[i].occupied[row] |= bit;
+          if (draw > occupied + unknown) block[i].free[row] |= bit;
+        }
+      }
+    }
+  }
+  [[nodiscard]] CellState at(std::size_t x, std::size_t y, std::size_t z) const {
+    const std::size_t i = x / 16 + 2 * (y / 16) + 4 * (z / 16);
+    if (cells.content[i] == BlockContent::kFree) return CellState::kFree;
+    if (cells.content[i] == BlockContent::kUnknown) return CellState::kUnknown;
+    const std::size_t row = 16 * (z % 16) + y % 16;
+    if (((block[i].occupied[row] >> (x % 16)) & 1U) != 0) return CellState::kOccupied;
+    return ((block[i].free[row] >> (x % 16)) & 1U) != 0 ? CellState::kFree : CellState::kUnknown;
+  }
+  std::array<CellBlock, 8> block{};
+  WayCells cells;
+};
+
+TEST(WayRooms, PlacesAreThoseOfABoxOfCells) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const Scene scene(seed);
+    const std::size_t width = 1 + seed % 7;
+    WayPlaces places;
+    find_places(scene.cells, static_cast<int>(width), places);
+    for (std::size_t i = 0; i < 4096; ++i) {
+      const std::size_t x = i % 16, y = i / 16 % 16, z = i / 256;
+      bool free = true, occupied = false;
+      for (std::size_t k = 0; k < width * width * width; ++k) {
+        const CellState state = scene.at(x + k % width, y + k / width % width, z + k / width / width);
+        free = free && state == CellState::kFree;
+        occupied = occupied || state == CellState::kOccupied;
+      }
+      const std::size_t row = 16 * z + y;
+      ASSERT_EQ((places.known[row] >> x) & 1U, free ? 1U : 0U) << seed << " " << i;
+      ASSERT_EQ((places.open[row] >> x) & 1U, !free && !occupied ? 1U : 0U) << seed << " " << i;
+    }
+  }
+}
+
+TEST(WayRooms, AreTheConnectedPlacesOfOneKind) {
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    const Scene scene(seed);
+    WayPlaces places;
+    find_places(scene.cells, 4, places);
+    WayRooms rooms;
+    number_rooms(places, rooms);
+    // Neighbours of one kind are in one room, unless the numbers ran out; each kind has its numbers.
+    for (std::int32_t i = 0; i < 4096; ++i) {
+      const std::int32_t x = i % 16, y = i / 16 % 16, z = i / 256;
+      const auto row = static_cast<std::size_t>(16 * z + y);
+      const bool known = ((places.known[row] >> x) & 1) != 0, open = ((places.open[row] >> x) & 1) != 0;
+      const unsigned room = rooms.at(x, y, z);
+      ASSERT_EQ(is_known_room(room), known);
+      ASSERT_EQ(room >= kFirstOpenRoom, open);
+      if (x < 15 && room != 0) {
+        const unsigned next = rooms.at(x + 1, y, z);
+        if (next != 0 && is_known_room(next) == known) {
+          ASSERT_EQ(room, next);
+        }
+      }
+    }
+    // A room is connected: whatever is reached from one of its places is all of it.
+    for (unsigned room = 1; room < kRooms - 1; ++room) {
+      if (room == kFirstOpenRoom - 1) continue;
+      std::vector<std::int32_t> stack;
+      std::vector<bool> seen(4096);
+      std::size_t all = 0, reached = 0;
+      for (std::int32_t i = 0; i < 4096; ++i) {
+        if (rooms.at(i % 16, i / 16 % 16, i / 256) != room) continue;
+        if (all++ == 0) stack.push_back(i), seen[static_cast<std::size_t>(i)] = true;
+      }
+      while (!stack.empty()) {
+        const std::int32_t i = stack.back();
+        stack.pop_back();
+        ++reached;
+        const auto visit = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
+          if (((x | y | z) & ~15) != 0 || rooms.at(x, y, z) != room) return;
+          const auto n = static_cast<std::size_t>(x + 16 * y + 256 * z);
+          if (!seen[n]) seen[n] = true, stack.push_back(static_cast<std::int32_t>(n));
+        };
+        const std::int32_t x = i % 16, y = i / 16 % 16, z = i / 256;
+        visit(x + 1, y, z), visit(x - 1, y, z), visit(x, y + 1, z), visit(x, y - 1, z), visit(x, y, z + 1), visit(x, y, z - 1);
+      }
+      EXPECT_EQ(reached, all) << "room " << room << " of seed " << seed;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace roborun::stages
