@@ -70,6 +70,14 @@ refuses "100, 125, 160, 200, 250, 320 or 400" audit --rate -400
 refuses "--rate" audit --rate fast
 refuses "SLOT:MILLISECONDS" audit --inject-spin nope:5
 refuses "cannot be opened" audit --compare nope.json nope.json
+refuses "cannot be opened" audit --compare nope.json,nope.json nope.json
+refuses "/nope/a.html: cannot be written" audit --html /nope/a.html
+refuses "/nope/a.json: cannot be written" audit --trace /nope/a.json
+refuses "/nope/a.npy: cannot be written" audit --samples /nope/a.npy
+refuses "'nope': must be one of missing, stopped, heap_calls" audit --require nope=1
+refuses "must be NAME=LIMIT with a limit of 0 or more" audit --require misses=-1
+refuses "must be NAME=LIMIT with a limit of 0 or more" audit --require heap_calls=0,misses
+refuses "must be 1024 MiB at most" audit --seconds 86400 --samples /tmp/roborun_cli_test.npy
 refuses "is not the JSON of an audit" audit --compare "$data/worlds/two_pillars.toml" "$data/worlds/two_pillars.toml"
 refuses "1 .. 27" memory --env 99
 refuses "cannot be opened" scenario run nope.toml
