@@ -22,6 +22,7 @@
 #include "platform/mission/settings_file.hpp"
 #include "platform/report/audit_compare.hpp"
 #include "platform/report/audit_verdict.hpp"
+#include "platform/report/instruction_counts.hpp"
 #include "platform/report/sha256.hpp"
 #include "platform/sitl/world/generator.hpp"
 
@@ -42,6 +43,7 @@ struct AuditOptions {
   std::string html;
   std::string trace;
   std::string samples;
+  std::string instructions;
   std::vector<std::string> require;
   std::vector<std::string> compare;
   double tolerance_ratio{1.5};
@@ -186,6 +188,24 @@ void check(const AuditOptions& options) {
     if (const std::string error = input::cannot_write(*path); !error.empty()) throw InputError(error);
 }
 
+std::optional<report::InstructionCounts> instructions_of(const std::string& path) {
+  if (path.empty()) return std::nullopt;
+  try {
+    return report::instruction_counts(input::read_text(path, "counts of toolchain/bench/run instructions"));
+  } catch (const std::invalid_argument& error) {
+    throw InputError(fmt::format("{}: {}", path, error.what()));
+  }
+}
+
+/// Puts the counts beside the measured times.
+void add(const report::InstructionCounts& counts, const std::string& path, report::AuditReport& result) {
+  result.identity.emplace_back("instructions",
+                               fmt::format("{} of commit {}, {}", path, counts.commit, digest_of_file(path)));
+  for (report::AuditSlot& slot : result.slots)
+    if (const auto found = counts.worst.find(slot.name); found != counts.worst.end())
+      slot.instructions = found->second;
+}
+
 void write_files(const AuditOptions& options, const report::AuditReport& result) {
   std::string error;
   if (!options.html.empty()) error = input::write_file(options.html, report::audit_html(result));
@@ -200,6 +220,7 @@ int audit(const AuditOptions& options) {
   if (!options.compare.empty()) return compare(options);
   check(options);
   const std::vector<report::Requirement> required = requirements(options);
+  const std::optional<report::InstructionCounts> counts = instructions_of(options.instructions);
   mission::RealTimeConfig config;
   const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.vehicle);
   mission::set_vehicle(config.mission, vehicle);
@@ -238,6 +259,7 @@ int audit(const AuditOptions& options) {
   if (terminal) fmt::print(stderr, "\r{:40}\r", "");
   for (const std::string& why : result.missing) fmt::print(stderr, "roborun: not real time: {}\n", why);
   identify(options, environment, vehicle, result);
+  if (counts) add(*counts, options.instructions, result);
   result.requirements = report::judge(result, required);
   const std::string again = same_flight(options);
   for (report::AuditSlot& slot : result.slots)
@@ -299,6 +321,8 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
                       "Write every slot of every frame for Perfetto (ui.perfetto.dev)");
   command->add_option("--samples", options->samples,
                       "Write every frame and slot as an array of NumPy (numpy.load)");
+  command->add_option("--instructions", options->instructions,
+                      "Show these counts beside the times: a file of toolchain/bench/run instructions");
   command->add_option("--require", options->require,
                       "NAME=LIMIT,...: at most so much, else FAIL (see below)");
   command

@@ -4,9 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
+
+#include "platform/report/shallow_json.hpp"
 
 namespace roborun::report {
 namespace {
@@ -15,7 +16,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kResolution_us = 10.0;
 constexpr double kSignificant = 0.05;
-constexpr int kDeepest = 32;  // an audit nests six deep
 
 /// What was flown: figures of other flights are not comparable.
 constexpr std::array kFlown{"rate_Hz",    "asked_seconds",   "environment", "seed",
@@ -31,13 +31,8 @@ bool is_one_of(const auto& names, const std::string& name) {
 }
 
 Json parse(const std::string& text) {
-  bool too_deep = false;
-  const auto shallow = [&too_deep](int depth, Json::parse_event_t, Json&) {
-    too_deep = too_deep || depth > kDeepest;
-    return !too_deep;
-  };
-  Json j = Json::parse(text, shallow, false);
-  if (too_deep || j.is_discarded() || !j.is_object() || !j.contains("slots") || !j.contains("lanes"))
+  Json j = parse_shallow(text);
+  if (j.is_discarded() || !j.is_object() || !j.contains("slots") || !j.contains("lanes"))
     throw std::invalid_argument("is not the JSON of an audit");
   if (!j.contains("verdict"))
     throw std::invalid_argument("is of an audit that did not write down what was flown: must be flown again");

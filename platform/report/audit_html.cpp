@@ -37,9 +37,9 @@ std::string verdict(const AuditReport& r) {
     for (const std::string& why : r.missing) h += fmt::format("<li>{}</li>\n", xml_escape(why));
     h += "</ul>\n";
   }
-  h += "<table>" + row({"requirement", "at most", "value", "verdict"}, "th");
+  h += "<table>" + row({"requirement", "at most", "stated by", "value", "verdict"}, "th");
   for (const JudgedRequirement& q : r.requirements)
-    h += row({q.name, fmt::format("{:g}", q.limit),
+    h += row({q.name, fmt::format("{:g}", q.limit), q.is_default ? "default" : "--require",
               q.value ? fmt::format("{:g}", *q.value) : "not shown: " + q.why_unknown,
               q.pass() ? "PASS" : "FAIL"});
   return h + "</table>\n";

@@ -138,7 +138,11 @@ std::string to_json(const AuditReport& r) {
   j["verdict"] = passes(r) ? "pass" : "fail";
   j["requirements"] = Json::array();
   for (const JudgedRequirement& q : r.requirements) {
-    Json row = {{"name", q.name}, {"limit", q.limit}, {"value", or_null(q.value)}, {"pass", q.pass()}};
+    Json row = {{"name", q.name},
+                {"limit", q.limit},
+                {"value", or_null(q.value)},
+                {"pass", q.pass()},
+                {"is_default", q.is_default}};
     if (!q.value) row["not_shown"] = q.why_unknown;
     j["requirements"].push_back(std::move(row));
   }
@@ -215,6 +219,8 @@ std::string verdict_of(const AuditReport& r) {
   std::size_t met = 0;
   for (const JudgedRequirement& q : r.requirements) met += q.pass() ? 1U : 0U;
   text += fmt::format(": {} of {} requirements are met\n", met, r.requirements.size());
+  for (const JudgedRequirement& q : r.requirements)
+    if (!q.is_default) text += fmt::format("  by --require: {} at most {:g}\n", q.name, q.limit);
   for (const auto& [where, verdict] : verdict_by_lane(r))
     text += fmt::format("  {:<11} {}\n", where, verdict);
   for (const JudgedRequirement& q : r.requirements) {

@@ -104,6 +104,7 @@ struct Interference {
 struct JudgedRequirement {
   std::string name;             ///< As in --require: NAME, or LANE.NAME.
   double limit{};               ///< At most.
+  bool is_default{};            ///< The limit is the one written down, nobody's own.
   std::optional<double> value;  ///< Nothing: it could not be known, and that is no pass.
   std::string why_unknown;
   [[nodiscard]] bool pass() const noexcept { return value && *value <= limit; }

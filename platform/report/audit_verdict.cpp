@@ -135,11 +135,11 @@ std::string all_names() {
 void put(std::vector<Requirement>& all, const std::string& name, double limit) {
   for (Requirement& r : all) {
     if (r.name == name) {
-      r.limit = limit;
+      r = {name, limit, false};
       return;
     }
   }
-  all.push_back({name, limit});
+  all.push_back({name, limit, false});
 }
 
 }  // namespace
@@ -173,7 +173,7 @@ std::vector<JudgedRequirement> judge(const AuditReport& report,
                                      const std::vector<Requirement>& requirements) {
   std::vector<JudgedRequirement> judged;
   for (const Requirement& requirement : requirements) {
-    JudgedRequirement j{requirement.name, requirement.limit, {}, {}};
+    JudgedRequirement j{requirement.name, requirement.limit, requirement.is_default, {}, {}};
     if (const RunFigure* f = run_figure(requirement.name)) {
       if (!f->applies(report)) continue;
       j.value = f->value(report);

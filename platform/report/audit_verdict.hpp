@@ -13,6 +13,7 @@ namespace roborun::report {
 struct Requirement {
   std::string name;  ///< NAME of the run, or LANE.NAME.
   double limit{};
+  bool is_default{true};
 };
 
 /// The defaults, with `texts` (each NAME=LIMIT, a limit of 0 or more) put in their place or added. Of a figure of lanes, NAME

@@ -77,6 +77,7 @@ refuses "/nope/a.npy: cannot be written" audit --samples /nope/a.npy
 refuses "'nope': must be one of missing, stopped, heap_calls" audit --require nope=1
 refuses "must be NAME=LIMIT with a limit of 0 or more" audit --require misses=-1
 refuses "must be NAME=LIMIT with a limit of 0 or more" audit --require heap_calls=0,misses
+refuses "must be what toolchain/bench/run instructions" audit --instructions "$data/worlds/two_pillars.toml"
 refuses "must be 1024 MiB at most" audit --seconds 86400 --samples /tmp/roborun_cli_test.npy
 refuses "is not the JSON of an audit" audit --compare "$data/worlds/two_pillars.toml" "$data/worlds/two_pillars.toml"
 refuses "1 .. 27" memory --env 99

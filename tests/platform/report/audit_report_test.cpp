@@ -15,6 +15,7 @@
 #include "core/random/counter_rng.hpp"
 #include "platform/report/audit_compare.hpp"
 #include "platform/report/audit_verdict.hpp"
+#include "platform/report/instruction_counts.hpp"
 #include "platform/report/sha256.hpp"
 
 namespace roborun::report {
@@ -180,6 +181,27 @@ TEST(AuditReport, HtmlNeedsNothingFromOutsideAndEscapesText) {
   EXPECT_EQ(html.find("nan"), std::string::npos);
 }
 
+TEST(AuditReport, PlotsStayInTheirFrames) {
+  AuditReport r = sample();
+  r.slots[4].pwcet = fit_pwcet(gumbel_us(800, 100.0, 10.0, 3));
+  ASSERT_TRUE(r.slots[4].pwcet.fitted);
+  r.lanes[1].time_line[3].worst_response_us = 9e6;
+  const std::string html = audit_html(r);
+  EXPECT_NE(html.find("block maxima, fit and its 95 % band"), std::string::npos);
+  std::size_t points = 0;
+  for (std::size_t at = html.find("points=\""); at != std::string::npos;
+       at = html.find("points=\"", at + 1)) {
+    const std::size_t svg = html.rfind("viewBox=\"0 0 ", at);
+    const double width = std::stod(html.substr(svg + 13)), height = 220.0;
+    const std::string list = html.substr(at + 8, html.find('"', at + 8) - at - 8);
+    for (std::size_t i = 0; i < list.size(); i = list.find(' ', i) + 1, ++points) {
+      const double x = std::stod(list.substr(i)), y = std::stod(list.substr(list.find(',', i) + 1));
+      ASSERT_TRUE(x >= 0.0 && x <= width && y >= 0.0 && y <= height) << x << " " << y << " in " << list;
+    }
+  }
+  EXPECT_GT(points, 300U);
+}
+
 TEST(AuditReport, SlicesOfOneTrackNestAndDoNotOverlap) {
   const Json j = Json::parse(perfetto_trace(sample()));
   struct Slice {
@@ -285,7 +307,8 @@ TEST(Verdict, PassesWhatMeetsEveryRequirementAndSaysSoFirst) {
   const Json j = Json::parse(to_json(r));
   EXPECT_EQ(j.at("verdict"), "pass");
   EXPECT_EQ(to_json(r).rfind("{\"verdict\":\"pass\",\"requirements\":[{\"name\":", 0), 0U);
-  for (const char* key : {"name", "limit", "value", "pass"}) EXPECT_TRUE(j["requirements"][0].contains(key));
+  for (const char* key : {"name", "limit", "value", "pass", "is_default"})
+    EXPECT_TRUE(j["requirements"][0].contains(key));
   const std::string html = audit_html(r);
   EXPECT_LT(html.find("Verdict: PASS"), html.find("<table>"));
 }
@@ -346,6 +369,8 @@ TEST(Verdict, RequirementsAreSetForOneLaneOrAllThatHaveOne) {
   EXPECT_TRUE(found(r, "flight.misses", {"misses=2"}).pass());
   EXPECT_TRUE(found(r, "decision.misses", {"misses=2"}).pass());
   EXPECT_TRUE(found(r, "flight.misses", {"flight.misses=2"}).pass());
+  EXPECT_FALSE(found(r, "flight.misses", {"flight.misses=2"}).is_default);
+  EXPECT_TRUE(found(r, "decision.misses", {"flight.misses=2"}).is_default);
   EXPECT_FALSE(found(r, "decision.misses", {"flight.misses=2"}).pass());
   EXPECT_FALSE(found(r, "background.response_max_us", {"background.response_max_us=1"}).pass());
   EXPECT_TRUE(found(r, "flight.jitter_max_us", {"jitter_max_us=9e9"}).pass())
@@ -365,6 +390,22 @@ TEST(Verdict, RefusesWhatIsNoRequirementAndListsWhatIs) {
   }
   for (const Requirement& q : requirements_of({}))
     EXPECT_NE(requirement_help().find(q.name.substr(q.name.find('.') + 1)), std::string::npos) << q.name;
+}
+
+TEST(InstructionCounts, AreReadOrRefused) {
+  const InstructionCounts counts =
+      instruction_counts(R"({"commit": "abc", "slots": {"map": {"runs": 16, "median": 5, "worst": 7}}})");
+  EXPECT_EQ(counts.commit, "abc");
+  EXPECT_EQ(counts.worst.at("map"), 7U);
+  for (const std::string& bad :
+       {std::string(), std::string("[]"), std::string(R"({"commit": "abc"})"),
+        std::string(R"({"commit": 1, "slots": {}})"),
+        std::string(R"({"commit": "abc", "slots": {"map": {"worst": "7"}}})"), std::string(1'000'000, '[')})
+    EXPECT_THROW((void)instruction_counts(bad), std::invalid_argument) << bad.substr(0, 60);
+  AuditReport r = sample();
+  r.slots[0].instructions = 24'140;
+  EXPECT_EQ(Json::parse(to_json(r))["slots"][0]["instructions"], 24'140);
+  EXPECT_NE(audit_html(r).find("<td>24140</td>"), std::string::npos);
 }
 
 TEST(Sha256, GivesTheDigestsOfTheStandard) {
