@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "platform/report/audit_plot.hpp"
 #include "platform/report/audit_report.hpp"
 #include "platform/report/svg.hpp"
@@ -39,9 +41,12 @@ std::string verdict(const AuditReport& r) {
   }
   h += "<table>" + row({"requirement", "at most", "stated by", "value", "verdict"}, "th");
   for (const JudgedRequirement& q : r.requirements)
-    h += row({q.name, fmt::format("{:g}", q.limit), q.is_default ? "default" : "--require",
+    h += row({q.name, std::isinf(q.limit) ? "not required" : fmt::format("{:g}", q.limit),
+              q.is_default ? "default" : "--require",
               q.value ? fmt::format("{:g}", *q.value) : "not shown: " + q.why_unknown,
-              q.pass() ? "PASS" : "FAIL"});
+              std::isinf(q.limit) ? "-"
+              : q.pass()          ? "PASS"
+                                  : "FAIL"});
   return h + "</table>\n";
 }
 

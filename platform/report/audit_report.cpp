@@ -214,13 +214,17 @@ std::string or_dash(const std::optional<double>& value) {
 
 namespace {
 
+std::string limit_text(double limit) {
+  return std::isinf(limit) ? "is not required" : fmt::format("at most {:g}", limit);
+}
+
 std::string verdict_of(const AuditReport& r) {
   std::string text = passes(r) ? "PASS" : "FAIL";
   std::size_t met = 0;
   for (const JudgedRequirement& q : r.requirements) met += q.pass() ? 1U : 0U;
   text += fmt::format(": {} of {} requirements are met\n", met, r.requirements.size());
   for (const JudgedRequirement& q : r.requirements)
-    if (!q.is_default) text += fmt::format("  by --require: {} at most {:g}\n", q.name, q.limit);
+    if (!q.is_default) text += fmt::format("  by --require: {} {}\n", q.name, limit_text(q.limit));
   for (const auto& [where, verdict] : verdict_by_lane(r))
     text += fmt::format("  {:<11} {}\n", where, verdict);
   for (const JudgedRequirement& q : r.requirements) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -103,11 +104,11 @@ struct Interference {
 /// One requirement and what became of it.
 struct JudgedRequirement {
   std::string name;             ///< As in --require: NAME, or LANE.NAME.
-  double limit{};               ///< At most.
+  double limit{};               ///< At most; infinity: taken back by --require NAME=none.
   bool is_default{};            ///< The limit is the one written down, nobody's own.
   std::optional<double> value;  ///< Nothing: it could not be known, and that is no pass.
   std::string why_unknown;
-  [[nodiscard]] bool pass() const noexcept { return value && *value <= limit; }
+  [[nodiscard]] bool pass() const noexcept { return std::isinf(limit) || (value && *value <= limit); }
 };
 
 struct AuditReport {

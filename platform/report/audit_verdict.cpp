@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
+#include <limits>
 #include <stdexcept>
 
 #include "core/executive/frame_table.hpp"
@@ -146,6 +148,7 @@ void put(std::vector<Requirement>& all, const std::string& name, double limit) {
 
 std::vector<Requirement> requirements_of(const std::vector<std::string>& texts) {
   std::vector<Requirement> all;
+  all.reserve(kRunFigures.size() + core::kLaneCount * kLaneFigures.size());
   for (const RunFigure& f : kRunFigures) all.push_back({f.name, f.limit});
   for (std::size_t i = 0; i < core::kLaneCount; ++i) {
     for (const LaneFigure& f : kLaneFigures)
@@ -161,9 +164,11 @@ std::vector<Requirement> requirements_of(const std::vector<std::string>& texts) 
           "'{}': must be one of {}; LANE: flight, decision, background, watchdog", name, all_names()));
     char* end = nullptr;
     const char* digits = equals == std::string::npos ? "" : text.c_str() + equals + 1;
-    const double limit = std::strtod(digits, &end);
-    if (end == digits || *end != '\0' || !std::isfinite(limit) || limit < 0.0)
-      throw std::invalid_argument(fmt::format("'{}': must be NAME=LIMIT with a limit of 0 or more", text));
+    const bool none = std::strcmp(digits, "none") == 0;
+    const double limit = none ? std::numeric_limits<double>::infinity() : std::strtod(digits, &end);
+    if (!none && (end == digits || *end != '\0' || !std::isfinite(limit) || limit < 0.0))
+      throw std::invalid_argument(
+          fmt::format("'{}': must be NAME=LIMIT with a limit of 0 or more, or none", text));
     for (const std::string& each : names) put(all, each, limit);
   }
   return all;
@@ -203,7 +208,7 @@ bool passes(const AuditReport& report) {
 }
 
 std::string requirement_help() {
-  std::string text = "Requirements (at most):\n";
+  std::string text = "Requirements (at most; NAME=none takes one back):\n";
   for (const RunFigure& f : kRunFigures)
     text += fmt::format("  {:<21}{:>3}  {}\n", f.name, f.limit, f.meaning);
   text +=

@@ -12,11 +12,11 @@ namespace roborun::report {
 /// "At most `limit`", of a lane or of the whole run.
 struct Requirement {
   std::string name;  ///< NAME of the run, or LANE.NAME.
-  double limit{};
+  double limit{};    ///< Infinity: not required.
   bool is_default{true};
 };
 
-/// The defaults, with `texts` (each NAME=LIMIT, a limit of 0 or more) put in their place or added. Of a figure of lanes, NAME
+/// The defaults, with `texts` (each NAME=LIMIT, a limit of 0 or more, or none) put in their place or added. Of a figure of lanes, NAME
 /// alone means every lane that has a default for it, LANE.NAME that lane. Throws std::invalid_argument with what
 /// would be right.
 [[nodiscard]] std::vector<Requirement> requirements_of(const std::vector<std::string>& texts);

@@ -88,6 +88,7 @@ std::vector<Gumbel> refits(const Gumbel& fit, std::size_t count) {
 
 ReturnLevel level_at(double reduced, const Gumbel& fit, const std::vector<Gumbel>& again) {
   std::vector<double> levels;
+  levels.reserve(again.size());
   for (const Gumbel& g : again) levels.push_back(g.level(reduced));
   std::sort(levels.begin(), levels.end());
   return {reduced, fit.level(reduced), levels[kRefits / 40], levels[kRefits - 1 - kRefits / 40]};

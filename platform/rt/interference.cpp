@@ -94,10 +94,10 @@ std::map<std::string, std::uint64_t> InterferenceWatch::interrupts_of(int cpu) {
     }
     if (read < columns) continue;  // ERR and MIS are no CPU's
     std::getline(fields >> std::ws, rest);
-    std::string text;
+    std::string text = number + " ";
     for (const char c : rest)
-      if (c != ' ' || (!text.empty() && text.back() != ' ')) text += c;
-    counts[number + " " + text] = ours;
+      if (c != ' ' || text.back() != ' ') text += c;
+    counts[text] = ours;
   }
   return counts;
 }
@@ -182,12 +182,13 @@ std::vector<Disturbance> InterferenceWatch::finish() {
         {on + "in interrupts", "ms", cpu.last.interrupts - cpu.before.interrupts, cpu.worst.interrupts});
     all.push_back({on + "in soft interrupts", "ms", cpu.last.soft_interrupts - cpu.before.soft_interrupts,
                    cpu.worst.soft_interrupts});
+    const std::string interrupt = on + "interrupt ";
     std::vector<Disturbance> interrupts;
     for (const auto& [name, count] : interrupts_of(cpu.number)) {
       const auto before = cpu.interrupts.find(name);
       const std::uint64_t then = before == cpu.interrupts.end() ? 0 : before->second;
       if (count > then)
-        interrupts.push_back({on + "interrupt " + name, "times", static_cast<double>(count - then), {}});
+        interrupts.push_back({interrupt + name, "times", static_cast<double>(count - then), {}});
     }
     keep_largest(interrupts);
     all.insert(all.end(), interrupts.begin(), interrupts.end());
@@ -217,6 +218,7 @@ std::vector<Disturbance> InterferenceWatch::finish() {
     if (id != getpid() && ms > 0.0) by_name[program.name] += ms;
   }
   std::vector<Disturbance> others;
+  others.reserve(by_name.size());
   for (const auto& [name, ms] : by_name) others.push_back({"other program " + name, "ms", ms, {}});
   keep_largest(others);
   all.insert(all.end(), others.begin(), others.end());

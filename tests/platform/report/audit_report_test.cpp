@@ -375,6 +375,13 @@ TEST(Verdict, RequirementsAreSetForOneLaneOrAllThatHaveOne) {
   EXPECT_FALSE(found(r, "background.response_max_us", {"background.response_max_us=1"}).pass());
   EXPECT_TRUE(found(r, "flight.jitter_max_us", {"jitter_max_us=9e9"}).pass())
       << "no default: the flight lane";
+  // Taken back in words, and said so; infinity is no number to ask for.
+  r.lanes[0].jitter.p999_us.reset();
+  r.requirements = judge(r, requirements_of({"misses=2", "slips=2", "jitter_p999_us=none"}));
+  EXPECT_TRUE(passes(r));
+  EXPECT_NE(audit_table(r).find("by --require: flight.jitter_p999_us is not required"), std::string::npos);
+  EXPECT_NE(audit_html(r).find("<td>not required</td><td>--require</td>"), std::string::npos);
+  EXPECT_NE(Json::parse(to_json(r))["requirements"].dump().find("\"limit\":null"), std::string::npos);
 }
 
 TEST(Verdict, RefusesWhatIsNoRequirementAndListsWhatIs) {
