@@ -306,6 +306,7 @@ void RealTimeRun::start() {
 
 std::vector<int> RealTimeRun::lane_cpus() const {
   std::vector<int> cpus;
+  cpus.reserve(core::kLaneCount);
   for (const core::LaneSpec& spec : core::kLanes) cpus.push_back(lanes_.placement(spec.id).cpu);
   return cpus;
 }
