@@ -12,8 +12,9 @@
 
 namespace roborun::report {
 
-/// Mission time at each value of density, spread and distance, a row a design of `profile`; the ratio of the
-/// highest knob to the lowest is beside the published one.
+/// Mission time at each value of density, spread and distance, one row per design of `profile`, from missions
+/// in which only that knob differs (sweep_sensitivity.hpp); the ratio of the highest knob to the lowest is
+/// beside the published one. Where the sweep has no such missions the row says which environments are missing.
 [[nodiscard]] std::string sensitivity_table(const std::vector<SweepRow>& rows, const std::string& profile);
 
 /// Flights of one environment and profile, several seeds a design: time, velocity, energy, latency, and what
