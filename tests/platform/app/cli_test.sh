@@ -52,7 +52,13 @@ refuses "must end in .toml, .bt or .ot" fly --world nope.xyz
 refuses "X,Y,Z" fly --world "$data/worlds/two_pillars.toml" --start 1,2
 refuses "cannot be opened" fly --settings nope.toml
 refuses "--nope" fly --nope
-refuses "--props-off" can send-esc can0 --seconds 1
+refuses "--props-off" can send-esc can0 --all --seconds 1
+refuses "must have --motor N, or --all" can send-esc nope0 --props-off --seconds 1
+refuses "must be 0 .. 3" can send-esc nope0 --props-off --motor 4 --seconds 1
+refuses "--motor excludes --all" can send-esc nope0 --props-off --motor 1 --all --seconds 1
+refuses "--throttle" can send-esc nope0 --props-off --motor 1 --throttle 0.5 --seconds 1
+refuses "--seconds" can send-esc nope0 --props-off --motor 1 --seconds 100
+refuses "nope0" can send-esc nope0 --props-off --motor 1 --seconds 1
 refuses "nocan7" can monitor nocan7
 refuses "cannot be opened" can decode --candump nope.log
 refuses "required" gpio check --open x
