@@ -102,6 +102,15 @@ vehicle ": width: must be a whole number" 's/^width = .*/width = 96.5/'
 vehicle ": mass_kg: missing in [body]" 's/^mass_kg = .*//'
 vehicle "drak: unknown key" 's/^.drag.$/[drak]/'
 rm -f /tmp/roborun_vehicle.$$.toml
+# Every pool has a name of its own, and after a flight a high-water mark.
+pools=$("$roborun" memory --fly 20 --json)
+names=$(grep -o '"name":"[^"]*"' <<<"$pools" | sort)
+if [[ $(wc -l <<<"$names") -ge 15 && -z $(uniq -d <<<"$names") && $pools != *null* ]]; then
+  passed=$((passed + 1))
+else
+  echo "FAILED memory --fly 20 names a pool twice or has no high-water mark: $pools"
+  failed=$((failed + 1))
+fi
 # What the program says of its keys is what the documents say.
 if "$roborun" config | cmp -s - <(sed -n '/^```text$/,/^```$/p' "$(dirname "$0")/../../../platform/CONFIG.md" | sed '1d;$d'); then
   passed=$((passed + 1))

@@ -42,7 +42,7 @@ class BusyPlanner final : public stages::Planner {
   double share_;
 };
 
-class WorkCheckTest : public ::testing::Test {
+class WorkCheck : public ::testing::Test {
  protected:
   WorkCheckTest()
       : world_(sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {})) {
@@ -64,7 +64,7 @@ class WorkCheckTest : public ::testing::Test {
   MissionConfig config_;
 };
 
-TEST_F(WorkCheckTest, ThePartsThatShipAreBelieved) {
+TEST_F(WorkCheck, ThePartsThatShipAreBelieved) {
   const report::MissionReport flown = fly_mission(world_, config_, {});
   ASSERT_EQ(flown.work.size(), 3U);
   for (const report::WorkRecord& w : flown.work) {
@@ -74,18 +74,18 @@ TEST_F(WorkCheckTest, ThePartsThatShipAreBelieved) {
   }
 }
 
-TEST_F(WorkCheckTest, APlannerThatCountsItsWorkIsBelieved) {
+TEST_F(WorkCheck, APlannerThatCountsItsWorkIsBelieved) {
   plan_with(1, 1.0);
   EXPECT_TRUE(is_believable(planner()));
 }
 
-TEST_F(WorkCheckTest, APlannerThatWorksMuchAndSaysLittleIsNotBelieved) {
+TEST_F(WorkCheck, APlannerThatWorksMuchAndSaysLittleIsNotBelieved) {
   plan_with(300, 1e-3);
   const report::WorkRecord lie = planner();
   EXPECT_FALSE(is_believable(lie)) << lie.measured_s << " s, counted " << lie.counted_s;
 }
 
-TEST_F(WorkCheckTest, TheLowestPriceCounts) {
+TEST_F(WorkCheck, TheLowestPriceCounts) {
   config_.host_costs = core::CostProfile{};
   EXPECT_EQ(planner().counted_s, 0.0) << "nothing costs anything on that machine";
   config_.host_costs.reset();
@@ -94,7 +94,7 @@ TEST_F(WorkCheckTest, TheLowestPriceCounts) {
   EXPECT_NEAR(planner().counted_s, at_factor_1_s / 4.0, 1e-6);
 }
 
-TEST_F(WorkCheckTest, APathForNothingIsRefused) {
+TEST_F(WorkCheck, APathForNothingIsRefused) {
   plan_with(1, 0.0);
   try {
     (void)fly_mission(world_, config_, {});
@@ -107,7 +107,7 @@ TEST_F(WorkCheckTest, APathForNothingIsRefused) {
   }
 }
 
-TEST_F(WorkCheckTest, LooksAreNotChangedByBeingTimed) {
+TEST_F(WorkCheck, LooksAreNotChangedByBeingTimed) {
   const std::string hash = fly_mission(world_, config_, {}).result.state_hash;
   config_.host_costs = core::CostProfile{};
   EXPECT_EQ(fly_mission(world_, config_, {}).result.state_hash, hash);
