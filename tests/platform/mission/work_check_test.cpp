@@ -44,8 +44,7 @@ class BusyPlanner final : public stages::Planner {
 
 class WorkCheck : public ::testing::Test {
  protected:
-  WorkCheckTest()
-      : world_(sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {})) {
+  WorkCheck() : world_(sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {})) {
     config_.flight.costs = board::paper().costs;
     config_.flight.model = board::paper().model;
   }
