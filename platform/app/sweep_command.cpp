@@ -63,6 +63,10 @@ std::string profile_digest(const board::Profile& profile) {
   return fmt::format("{:016x}", hash.value());
 }
 
+std::string program_digest() {
+  return evaluation::digest_of(input::read_text("/proc/self/exe", "this program"));
+}
+
 void set_shard(const std::string& text, evaluation::SweepPlan& plan) {
   constexpr int kMost = 10000;
   const std::size_t slash = text.find('/');
@@ -120,7 +124,7 @@ evaluation::SweepPlan plan_of(const SweepOptions& options, evaluation::SweepInpu
   }
   refuse_twice("--profile", names);
   plan.commit = report::build_identity().commit;
-  plan.build = evaluation::digest_of(input::read_text("/proc/self/exe", "this program"));
+  plan.build = program_digest();
   return plan;
 }
 
@@ -155,12 +159,15 @@ int sweep(const SweepOptions& options) {
 }
 
 int merge(const SweepOptions& options) {
-  // The report is made here: it must come from the sources that flew.
-  const std::string flown = evaluation::plan_of_folder(options.merged.front()).commit;
-  if (flown != report::build_identity().commit)
+  // The report is made here: it must come from the sources that flew. A commit names them if nothing was changed;
+  // then another machine's program may have flown.
+  const evaluation::SweepPlan flown = evaluation::plan_of_folder(options.merged.front());
+  const bool named = flown.commit.size() == 40;
+  if (flown.commit != report::build_identity().commit || (!named && flown.build != program_digest()))
     throw InputError(fmt::format(
-        "{}: was flown by commit {}, this program is of {}: must be merged by the program that flew",
-        options.merged.front(), flown.empty() ? "unknown" : flown, report::build_identity().commit));
+        "{}: was flown by commit {}, program {}; this is of {}, {}: must be merged by the program that flew",
+        options.merged.front(), flown.commit.empty() ? "unknown" : flown.commit, flown.build,
+        report::build_identity().commit, program_digest()));
   evaluation::merge_shards(options.merged, options.out);
   const evaluation::SweepStore store(options.out, evaluation::plan_of_folder(options.out));
   tell(store, options);

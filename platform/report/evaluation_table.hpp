@@ -18,7 +18,8 @@ namespace roborun::report {
 [[nodiscard]] std::string sensitivity_table(const std::vector<SweepRow>& rows, const std::string& profile);
 
 /// Flights of one environment and profile, several seeds a design: time, velocity, energy, latency, and what
-/// the decisions in zones A, B and C took: mean by stage, and the longest. The borders are x in metres;
+/// the decisions in zones A, B and C took: mean by stage, and the longest; for environment 14 beside what was
+/// published. The borders are x in metres;
 /// empty: one zone.
 [[nodiscard]] std::string representative_table(std::span<const MissionReport> flights,
                                                const std::vector<double>& zone_borders_m);

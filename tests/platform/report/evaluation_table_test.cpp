@@ -93,6 +93,13 @@ TEST(RepresentativeTable, SplitsLatencyByZoneAndStageBesideWhatWasPublished) {
   EXPECT_TRUE(says(table, "aware        A", "2.90 +-3.81     6.00    up to 10    0.100    0.100    2.000"));
   EXPECT_TRUE(says(table, "aware        B", "0.15"));
   EXPECT_TRUE(says(representative_table(flights, {}), "aware        all", "6.00"));
+  EXPECT_TRUE(says(table, "  published", "2.01"));
+  for (MissionReport& flight : flights) flight.result.env = "2";
+  const std::string other = representative_table(flights, {200.0, 700.0});
+  EXPECT_TRUE(says(other, "aware ", "2/2        225 +-0"));
+  for (const char* printed : {"2.01", "0.43", "4.6 velocity", "up to"})
+    EXPECT_EQ(other.find(printed), std::string::npos) << printed << " is of environment 14";
+  EXPECT_FALSE(says(other, "aware        B", "0.15"));
 }
 
 }  // namespace
