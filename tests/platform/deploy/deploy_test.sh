@@ -82,7 +82,8 @@ finds_nothing() {
 }
 check "can-irq-priority that finds nothing fails and says so" finds_nothing
 sets_what_it_finds() {
-  bash -c 'echo "irq/99-can7" >/proc/$$/comm; read -r -t 30' < <(sleep 30) &
+  mkfifo "$scratch/never"
+  bash -c 'echo "irq/99-can7" >/proc/$$/comm; read -r -t 30' <>"$scratch/never" &
   local thread=$! code
   for _ in $(seq 100); do grep -qs can7 "/proc/$thread/comm" && break; sleep 0.02; done
   irq_priority
