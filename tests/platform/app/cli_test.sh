@@ -52,7 +52,13 @@ refuses "must end in .toml, .bt or .ot" fly --world nope.xyz
 refuses "X,Y,Z" fly --world "$data/worlds/two_pillars.toml" --start 1,2
 refuses "cannot be opened" fly --settings nope.toml
 refuses "--nope" fly --nope
-refuses "--props-off" can send-esc can0 --seconds 1
+refuses "--props-off" can send-esc can0 --all --seconds 1
+refuses "must have --motor N, or --all" can send-esc nope0 --props-off --seconds 1
+refuses "must be 0 .. 3" can send-esc nope0 --props-off --motor 4 --seconds 1
+refuses "--motor excludes --all" can send-esc nope0 --props-off --motor 1 --all --seconds 1
+refuses "--throttle" can send-esc nope0 --props-off --motor 1 --throttle 0.5 --seconds 1
+refuses "--seconds" can send-esc nope0 --props-off --motor 1 --seconds 100
+refuses "nope0" can send-esc nope0 --props-off --motor 1 --seconds 1
 refuses "nocan7" can monitor nocan7
 refuses "cannot be opened" can decode --candump nope.log
 refuses "required" gpio check --open x
@@ -105,6 +111,15 @@ vehicle ": width: must be a whole number" 's/^width = .*/width = 96.5/'
 vehicle ": mass_kg: missing in [body]" 's/^mass_kg = .*//'
 vehicle "drak: unknown key" 's/^.drag.$/[drak]/'
 rm -f /tmp/roborun_vehicle.$$.toml
+# Every pool has a name of its own, and after a flight a high-water mark.
+pools=$("$roborun" memory --fly 20 --json)
+names=$(grep -o '"name":"[^"]*"' <<<"$pools" | sort)
+if [[ $(wc -l <<<"$names") -ge 15 && -z $(uniq -d <<<"$names") && $pools != *null* ]]; then
+  passed=$((passed + 1))
+else
+  echo "FAILED memory --fly 20 names a pool twice or has no high-water mark: $pools"
+  failed=$((failed + 1))
+fi
 # What the program says of its keys is what the documents say.
 if "$roborun" config | cmp -s - <(sed -n '/^```text$/,/^```$/p' "$(dirname "$0")/../../../platform/CONFIG.md" | sed '1d;$d'); then
   passed=$((passed + 1))
