@@ -11,6 +11,7 @@
 
 #include "platform/board/board_profile.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/output_file.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/audit_run.hpp"
 #include "platform/mission/settings_file.hpp"
@@ -94,7 +95,12 @@ int audit(const AuditOptions& options) {
                     "320 or 400",
                     options.rate_Hz));
   mission::RealTimeConfig config;
-  mission::set_vehicle(config.mission, vehicle::load_vehicle(options.vehicle));
+  const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.vehicle);
+  mission::set_vehicle(config.mission, vehicle);
+  std::vector<std::string> inputs = vehicle.patterns;
+  for (const std::string& path : {options.vehicle, options.settings, options.profile}) inputs.push_back(path);
+  if (options.profile == "host") inputs.push_back(board::default_host_path({}));
+  input::check_outputs({{"--html", options.html}, {"--trace", options.trace}}, inputs);
   if (!options.settings.empty()) mission::load_settings(options.settings, config.mission);
   config.inject = injection_of(options.spin);
   const sitl::NamedEnvironment environment = sitl::environment(options.env);
@@ -129,11 +135,8 @@ int audit(const AuditOptions& options) {
     fmt::print("{}\n", report::to_json(result));
   else
     fmt::print("{}", report::audit_table(result));
-  std::string error;
-  if (!options.html.empty()) error = input::write_file(options.html, report::audit_html(result));
-  if (error.empty() && !options.trace.empty())
-    error = input::write_file(options.trace, report::perfetto_trace(result));
-  if (!error.empty()) throw InputError(error);
+  if (!options.html.empty()) input::write_file(options.html, report::audit_html(result));
+  if (!options.trace.empty()) input::write_file(options.trace, report::perfetto_trace(result));
   const bool clean = result.heap_calls_after_start == 0 && report::minor_faults(result) == 0 &&
                      report::major_faults(result) == 0 && result.stopped_by.empty();
   return clean ? 0 : 1;

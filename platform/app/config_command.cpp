@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "platform/app/exit_code.hpp"
 #include "platform/input/key_text.hpp"
 #include "platform/mission/settings_file.hpp"
 #include "platform/vehicle/vehicle_file.hpp"
@@ -31,7 +32,7 @@ int config(bool json) {
   if (json) {
     nlohmann::ordered_json j = {{"settings", json_of(settings)}, {"vehicle", json_of(vehicle)}};
     fmt::print("{}\n", j.dump());
-    return 0;
+    return kDone;
   }
   fmt::print(
       "# Settings of a simulated mission: --settings FILE. Every key may be left out.\n"
@@ -48,7 +49,7 @@ int config(bool json) {
       "measured;\n"
       "[[lidar]] pattern = FILE, a line \"azimuth_deg elevation_deg\" per direction.\n",
       input::reference_of(vehicle));
-  return 0;
+  return kDone;
 }
 
 }  // namespace

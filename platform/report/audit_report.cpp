@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "platform/input/json_reader.hpp"
+
 namespace roborun::report {
 namespace {
 
@@ -205,8 +207,13 @@ Comparison compare_audits(const std::string& before_json, const std::string& aft
                           double tolerance_ratio) {
   constexpr double kResolution_us = 10.0;
   const auto parse = [](const std::string& text) {
-    Json j = Json::parse(text, nullptr, false);
-    if (j.is_discarded() || !j.is_object() || !j.contains("slots") || !j.contains("lanes"))
+    Json j;
+    try {
+      j = input::parse_json(text);
+    } catch (const InputError& error) {
+      throw std::invalid_argument(fmt::format("is not the JSON of an audit: {}", error.what()));
+    }
+    if (!j.is_object() || !j.contains("slots") || !j.contains("lanes"))
       throw std::invalid_argument("is not the JSON of an audit");
     return j;
   };
