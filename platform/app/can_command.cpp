@@ -133,7 +133,7 @@ class Decoder {
     out["time_s"] = time_s;
     out["interface"] = line.interface;
     out["fields"] = std::move(fields);
-    fmt::print("{}\n", out.dump());
+    fmt::print("{}\n", out.dump(-1, ' ', false, Json::error_handler_t::replace));
   }
 
   static constexpr std::size_t kMostInterfaces = 32;

@@ -49,7 +49,7 @@ int info(const MapOptions& options) {
                                          {"occupied_m3", cell_m3 * static_cast<double>(occupied)},
                                          {"min_W", {box.min_W.x(), box.min_W.y(), box.min_W.z()}},
                                          {"max_W", {box.max_W.x(), box.max_W.y(), box.max_W.z()}}};
-    fmt::print("{}\n", json.dump());
+    fmt::print("{}\n", json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
     return kDone;
   }
   fmt::print(

@@ -122,7 +122,9 @@ int run_scenarios(const ScenarioOptions& options) {
   const input::StopOnSignal stop;
   report::ProgressLine line;
   evaluation::WorkerCalls calls;
-  calls.work = [&](std::size_t i) { return verdict_of(scenarios[i]).dump(); };
+  calls.work = [&](std::size_t i) {
+    return verdict_of(scenarios[i]).dump(-1, ' ', false, json::error_handler_t::replace);
+  };
   calls.answered = [&](std::size_t i, const std::string& answer) {
     verdicts[i] = json::parse(answer);
     ++done;

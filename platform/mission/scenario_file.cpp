@@ -172,6 +172,10 @@ void ScenarioReader::read_expectation(Scenario& s) const {
         choice(*node, "condition", names_of<governor::Condition, governor::kConditionCount>())));
   s.expect.within_s = maybe(t, "within_s", 7200);
   s.expect.motors_stop_within_s = maybe(t, "motors_stop_within_s", 7200);
+  for (const char* key : {"within_s", "motors_stop_within_s"}) {
+    if (const toml::node* node = t.get(key); node != nullptr && s.config.faults.empty())
+      reader_.refuse(*node, key, "goes with a [[fault]]: it counts from the first one");
+  }
   s.expect.touchdown_mps = maybe(t, "touchdown_mps", 100);
   s.expect.home_within_m = maybe(t, "home_within_m", 20000);
   if (const toml::node* node = t.get("landing_site_known"))

@@ -68,6 +68,8 @@ check "the one too many is named: $(tail -1 "$work/err")" \
   grep -q "line 33: interface 'c32' is one too many: must be at most 32 in a log" "$work/err"
 head -32 "$work/many.log" | "$roborun" can decode >"$work/out" 2>"$work/err"
 check "as many as there may be are read" grep -q "^roborun can decode: 32 transfers" "$work/err"
+printf '(1.0) \xff 10015501#00000000000000C0\n' | "$roborun" can decode --json >"$work/out" 2>"$work/err"
+check "a name that is no text does not end the decoding: $(tail -1 "$work/err")" grep -q "^roborun can decode: 1 transfers" "$work/err"
 "$roborun" can decode --candump "$work" 2>"$work/err" >"$work/out"
 check "a folder is no log" test $? -eq 2
 [[ $failed -eq 0 ]] && echo "roborun can: all checks passed"

@@ -62,6 +62,7 @@ TEST(ScenarioFile, RefusesWithFileLineKeyAndWhatWouldBeRight) {
        ":7: instance: must be a whole number from 0 to 3"},
       {fault + "component = \"esc\"\nkind = \"off\"\ninstance = 0.5\n" + kTail,
        ":7: instance: must be a whole number from 0 to 3"},
+      {kHead + "[expect]\noutcome = \"landed\"\nwithin_s = 1\n", ":6: within_s: goes with a [[fault]]"},
       {kHead + "seed = 1.5\n" + kTail, ":4: seed: must be a whole number"},
       {fault + "component = \"esc\"\nkind = \"off\"\nphase = \"cruise\"\n" + kTail,
        ":7: phase: 'cruise' must be one of ground, take_off, mission"},
