@@ -327,7 +327,8 @@ void add_bus_commands(CLI::App& can_app, const std::shared_ptr<CanOptions>& opti
       "monitor", "As decode, live from a SocketCAN interface; counts of errors at the end");
   monitor_app->add_option("interface", options->interface, "can0")->required();
   monitor_app->add_flag("--json", options->json, "As of decode");
-  add_number(*monitor_app, "--seconds", options->seconds, 0.0, 1e9, "Stop after so long; default: never")
+  add_number(*monitor_app, "--seconds", options->seconds, 0.0, 1e9,
+             "Stop after so long; default: at Ctrl-C (exit code 130)")
       ->default_str("");
   monitor_app->callback([options, &run] {
     run = [options] { return monitor(options->interface, options->json, options->seconds); };

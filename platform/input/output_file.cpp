@@ -201,13 +201,13 @@ void check_outputs(const std::vector<NamedOutput>& outputs, const std::vector<st
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     const auto& [option, path] = outputs[i];
     if (path.empty()) continue;
+    if (const int error = obstacle_to(path); error != 0)
+      throw InputError(fmt::format("{}: {}", option, cannot(path, error)));
+    if (is_written_through(path)) continue;
     for (const std::string& in : inputs) {
       if (!in.empty() && same_file(path, in))
         throw InputError(fmt::format("{}: {}: is {}, which is read: must be another file", option, path, in));
     }
-    if (const int error = obstacle_to(path); error != 0)
-      throw InputError(fmt::format("{}: {}", option, cannot(path, error)));
-    if (is_written_through(path)) continue;
     if (is_standard_output(path))
       throw InputError(
           fmt::format("{}: {}: standard output goes there, too: must be another file", option, path));

@@ -174,7 +174,7 @@ TEST(CheckOutputs, RefusesAnOutputThatIsReadOrWrittenTwice) {
   EXPECT_EQ(line({{"--trace", fresh}, {"--plot", in / "." / "new"}}, {}),
             "--plot: " + (in / "." / "new").string() + ": is the file of --trace: must be another file");
   EXPECT_NE(line({{"--trace", world}, {"--plot", in / "hard"}}, {}), "");
-  EXPECT_EQ(line({{"--trace", "/dev/null"}, {"--plot", "/dev/null"}}, {}), "");
+  EXPECT_EQ(line({{"--trace", "/dev/null"}, {"--plot", "/dev/null"}}, {"/dev/null"}), "");
   EXPECT_EQ(line({{"--trace", ""}, {"--plot", ""}}, {"", "paper"}), "");
   EXPECT_EQ(line({{"--trace", fresh}}, {world, "paper"}), "");
   EXPECT_FALSE(fs::exists(fresh));
