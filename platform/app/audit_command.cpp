@@ -14,9 +14,12 @@
 #include <string>
 #include <vector>
 
+#include "platform/app/exit_code.hpp"
+#include "platform/app/options.hpp"
 #include "platform/board/board_profile.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/output_file.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/audit_run.hpp"
 #include "platform/mission/settings_file.hpp"
@@ -33,7 +36,7 @@ struct AuditOptions {
   double seconds{60.0};
   int rate_Hz{400};
   std::string env{"14"};
-  std::uint64_t seed{1};
+  std::string seed{"1"};
   std::string profile{"host"};
   std::string vehicle{"paper"};
   std::string settings;
@@ -56,9 +59,6 @@ struct AuditOptions {
 };
 
 int compare(const AuditOptions& options) {
-  if (!(options.tolerance_ratio >= 1.0 && options.tolerance_ratio <= 100.0))
-    throw InputError(
-        fmt::format("--tolerance: {} is out of range: must be from 1 to 100", options.tolerance_ratio));
   const auto side = [](const std::string& names) {
     std::vector<std::string> texts;
     for (const std::string& name : input::split(names))
@@ -82,7 +82,7 @@ int compare(const AuditOptions& options) {
   for (const std::string& note : result.notes) fmt::print("note: {}\n", note);
   fmt::print("{}\n",
              result.worse.empty() ? "no regression" : fmt::format("{} regressions", result.worse.size()));
-  return result.worse.empty() ? 0 : 1;
+  return result.worse.empty() ? kDone : kNotGood;
 }
 
 /// SLOT:MILLISECONDS, in every run of the slot from the 400th of the flight lane or the 5th of others on.
@@ -176,16 +176,12 @@ void identify(const AuditOptions& options, const sitl::NamedEnvironment& environ
 void check(const AuditOptions& options) {
   if (!options.can.empty() && !options.props_off)
     throw InputError("--can: real ESCs on that bus would turn: take the propellers off and say --props-off");
-  if (!(options.seconds >= 1.0 && options.seconds <= 86400.0))
-    throw InputError(fmt::format("--seconds: {} is out of range: must be from 1 to 86400", options.seconds));
   if (!core::is_flight_rate(options.rate_Hz))
     throw InputError(
         fmt::format("--rate: {} Hz: must be 100 to 400 Hz with a minor frame of whole microseconds: 100, "
                     "125, 160, 200, 250, "
                     "320 or 400",
                     options.rate_Hz));
-  for (const std::string* path : {&options.html, &options.trace, &options.samples})
-    if (const std::string error = input::cannot_write(*path); !error.empty()) throw InputError(error);
 }
 
 std::optional<report::InstructionCounts> instructions_of(const std::string& path) {
@@ -207,13 +203,9 @@ void add(const report::InstructionCounts& counts, const std::string& path, repor
 }
 
 void write_files(const AuditOptions& options, const report::AuditReport& result) {
-  std::string error;
-  if (!options.html.empty()) error = input::write_file(options.html, report::audit_html(result));
-  if (error.empty() && !options.trace.empty())
-    error = input::write_file(options.trace, report::perfetto_trace(result));
-  if (error.empty() && !options.samples.empty())
-    error = input::write_file(options.samples, report::sample_file(result));
-  if (!error.empty()) throw InputError(error);
+  if (!options.html.empty()) input::write_file(options.html, report::audit_html(result));
+  if (!options.trace.empty()) input::write_file(options.trace, report::perfetto_trace(result));
+  if (!options.samples.empty()) input::write_file(options.samples, report::sample_file(result));
 }
 
 int audit(const AuditOptions& options) {
@@ -224,11 +216,18 @@ int audit(const AuditOptions& options) {
   mission::RealTimeConfig config;
   const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.vehicle);
   mission::set_vehicle(config.mission, vehicle);
+  std::vector<std::string> inputs = vehicle.patterns;
+  for (const std::string& path : {options.vehicle, options.settings, options.profile, options.instructions})
+    inputs.push_back(path);
+  if (options.profile == "host") inputs.push_back(board::default_host_path({}));
+  input::check_outputs({{"--html", options.html}, {"--trace", options.trace}, {"--samples", options.samples}},
+                       inputs);
   if (!options.settings.empty()) mission::load_settings(options.settings, config.mission);
   config.inject = injection_of(options.spin);
   const sitl::NamedEnvironment environment = sitl::environment(options.env);
-  const sitl::World world = sitl::generate(environment.knobs, sitl::Mission::kPackageDelivery, options.seed);
-  config.mission.seed = options.seed;
+  const std::uint64_t seed = input::seed_of("--seed", options.seed);
+  const sitl::World world = sitl::generate(environment.knobs, sitl::Mission::kPackageDelivery, seed);
+  config.mission.seed = seed;
   config.mission.flight.minor_frame = core::minor_frame_of(options.rate_Hz);
   config.seconds = options.seconds;
   config.best_effort = options.best_effort;
@@ -271,7 +270,7 @@ int audit(const AuditOptions& options) {
   else
     fmt::print("{}", report::audit_table(result));
   write_files(options, result);
-  return report::passes(result) ? 0 : 1;
+  return report::passes(result) ? kDone : kNotGood;
 }
 
 }  // namespace
@@ -293,7 +292,7 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
       "Exit code: 0 PASS (with --compare: no regression), 1 FAIL (a regression), 2 bad input, or no real "
       "time to be "
       "had here.");
-  command->add_option("--seconds", options->seconds, "How long, 1 .. 86400")->capture_default_str();
+  add_number(*command, "--seconds", options->seconds, 1.0, 86400.0, "How long, 1 .. 86400");
   command
       ->add_option("--rate", options->rate_Hz, "Of the flight lane, Hz: 100, 125, 160, 200, 250, 320 or 400")
       ->capture_default_str();
@@ -331,10 +330,8 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
           "JSON files, before and after: what became worse; three or more a side (A1,A2,A3 B1,B2,B3) tell "
           "it from noise")
       ->expected(2);
-  command
-      ->add_option("--tolerance", options->tolerance_ratio,
-                   "With --compare: worse is more than so many times")
-      ->capture_default_str();
+  CLI::Option* tolerance = add_number(*command, "--tolerance", options->tolerance_ratio, 1.0, 100.0,
+                                      "With --compare: worse is more than so many times");
   command
       ->add_option(
           "--can", options->can,
@@ -342,8 +339,8 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
           "second one")
       ->expected(2)
       ->delimiter(',');
-  command->add_flag("--props-off", options->props_off,
-                    "With --can: no propeller is on any motor of that bus");
+  CLI::Option* props_off = command->add_flag("--props-off", options->props_off,
+                                             "With --can: no propeller is on any motor of that bus");
   auto* kill_lines = command->add_option(
       "--kill-lines", options->kill_lines,
       "A kill switch on lines of this machine: normally open and normally closed contact, each a name or "
@@ -358,7 +355,17 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
   command->add_option("--inject-spin", options->spin,
                       "A fault: SLOT:MILLISECONDS, busy in every run of that slot from the 400th (flight "
                       "lane) or the 5th on");
-  command->callback([options, &run] { run = [options] { return audit(*options); }; });
+  command->callback([command, options, tolerance, props_off, &run] {
+    run = [=] {
+      const bool compares = !options->compare.empty();
+      refuse_alone(*tolerance, compares, "--compare");
+      refuse_alone(*props_off, !options->can.empty(), "--can");
+      for (const CLI::Option* option : command->get_options())
+        if (option->get_single_name() != "compare" && option != tolerance)
+          refuse_alone(*option, !compares, "a flight, not with --compare");
+      return audit(*options);
+    };
+  });
 }
 
 }  // namespace roborun::app

@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "platform/app/exit_code.hpp"
 #include "platform/input/key_text.hpp"
 #include "platform/mission/settings_file.hpp"
 #include "platform/sitl/world/world_file.hpp"
@@ -60,7 +61,7 @@ int config(bool json) {
     nlohmann::ordered_json j = {
         {"settings", json_of(settings)}, {"vehicle", json_of(vehicle)}, {"world", json_of(world)}};
     fmt::print("{}\n", j.dump());
-    return 0;
+    return kDone;
   }
   fmt::print(
       "# Settings of a simulated mission: --settings FILE. Every key may be left out.\n"
@@ -87,7 +88,7 @@ int config(bool json) {
       "# All numbers at most 20,000. At most 100,000 [[pillar]], 100,000 [[box]] and 1,000 [[body]].\n"
       "# key, how it is written, default, meaning\n\n{}",
       reference_of(world));
-  return 0;
+  return kDone;
 }
 
 }  // namespace

@@ -10,11 +10,15 @@
 #include <string>
 #include <vector>
 
+#include "platform/app/exit_code.hpp"
+#include "platform/app/options.hpp"
 #include "platform/board/board_profile.hpp"
 #include "platform/board/plugin_loader.hpp"
 #include "platform/evaluation/scene.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/output_file.hpp"
+#include "platform/input/stop_signal.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/mission.hpp"
 #include "platform/mission/settings_file.hpp"
@@ -53,30 +57,25 @@ struct FlyOptions {
 
 std::optional<Vector3> point_of(const char* option, const std::string& text) {
   if (text.empty()) return std::nullopt;
-  const std::vector<std::string> parts = input::split(text);
-  Vector3 p_W = Vector3::Zero();
-  bool ok = parts.size() == 3;
-  for (std::size_t i = 0; ok && i < 3; ++i) {
-    char* end = nullptr;
-    p_W[static_cast<Eigen::Index>(i)] = std::strtod(parts[i].c_str(), &end);
-    ok = !parts[i].empty() && *end == '\0';
+  std::vector<double> p;
+  for (const std::string& part : input::split(text)) {
+    if (const auto value = input::number(part)) p.push_back(*value);
   }
-  if (!ok || !is_finite(p_W))
+  if (p.size() != 3 || input::split(text).size() != 3)
     throw InputError(fmt::format("{}: '{}' is not a point: must be X,Y,Z in metres", option, text));
-  return p_W;
+  return Vector3(p[0], p[1], p[2]);
+}
+
+std::string host_file_of(const FlyOptions& options) {
+  return options.host_file.empty() ? board::default_host_path({options.map, options.planner})
+                                   : options.host_file;
 }
 
 board::Profile profile_of(const FlyOptions& options) {
-  if (!(options.host_factor > 0.0 && options.host_factor <= 1000.0)) {
-    throw InputError(
-        fmt::format("--host-factor: {} is out of range: must be above 0, at most 1000", options.host_factor));
-  }
   const board::BackendNames backends{options.map, options.planner};
   if (options.profile != "host") return board::load_profile(options.profile, backends);
   std::string note;
-  const board::Profile profile =
-      board::host(options.host_file.empty() ? board::default_host_path(backends) : options.host_file,
-                  backends, options.host_factor, note);
+  const board::Profile profile = board::host(host_file_of(options), backends, options.host_factor, note);
   if (!note.empty()) fmt::print(stderr, "roborun: {}\n", note);
   return profile;
 }
@@ -115,12 +114,17 @@ int fly(const FlyOptions& options) {
                                  fmt::join(report::kPathColourName, ", ")));
   if (!options.record.empty() && designs.size() != 1)
     throw InputError("--record: one flight a file: must go with one --design");
-  for (const std::string& path : {options.trace, options.plot, options.record}) {
-    const std::string error = input::cannot_write(path);
-    if (!error.empty()) throw InputError(error);
-  }
   mission::MissionConfig config;
-  mission::set_vehicle(config, vehicle::load_vehicle(options.vehicle));
+  const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.vehicle);
+  mission::set_vehicle(config, vehicle);
+  std::vector<std::string> inputs = vehicle.patterns;
+  for (const std::string& path : {options.vehicle, options.world, options.settings, options.profile})
+    inputs.push_back(path);
+  if (options.profile == "host") inputs.push_back(host_file_of(options));
+  for (const std::string& name : {options.map, options.planner})
+    inputs.push_back(name.substr(name.find(':') + 1));  // of a plugin
+  input::check_outputs({{"--record", options.record}, {"--trace", options.trace}, {"--plot", options.plot}},
+                       inputs);
   if (!options.settings.empty()) mission::load_settings(options.settings, config);
   const sitl::Endpoints endpoints{point_of("--start", options.start), point_of("--goal", options.goal)};
   std::string env;
@@ -165,9 +169,18 @@ int fly(const FlyOptions& options) {
   std::vector<report::MissionReport> reports;
   bool all_reached = true;
   bool believed = true;
+  const input::StopOnSignal stop;
   for (const governor::Design design : designs) {
     config.flight.design = design;
     report::ProgressLine line;
+    config.each_frame = [&](const mission::FrameRecord& frame) {
+      if (!input::StopOnSignal::requested()) return;
+      throw input::Interrupted(
+          fmt::format("{} after {:.0f} s of flight, {:.0f} m from the goal; {} of {} designs flown; no file "
+                      "was written",
+                      governor::to_string(design), seconds(frame.now.time_since_epoch()),
+                      (world->goal_W() - frame.truth.p_WB).norm(), reports.size(), designs.size()));
+    };
     reports.push_back(mission::fly_mission(*world, config, [&line, design](const mission::Progress& p) {
       if (!line.due()) return;
       line.show(fmt::format("{:<12} {:3.0f} % of the way, {:6.0f} s flown, {:4.1f} m/s, {:3.0f} x real time",
@@ -191,19 +204,17 @@ int fly(const FlyOptions& options) {
     for (const report::MissionResult& r : results)
       fmt::print("{:<12} state_hash {}, {:.0f} x real time\n", r.design, r.state_hash, r.real_time_factor);
   }
-  std::string error;
-  if (!options.trace.empty()) error = input::write_file(options.trace, report::trace_csv(reports));
-  if (error.empty() && !options.plot.empty()) {
+  if (!options.trace.empty()) input::write_file(options.trace, report::trace_csv(reports));
+  if (!options.plot.empty()) {
     const report::Scene scene = evaluation::scene_of(*world, title, zone_m);
     const auto by = static_cast<report::PathColour>(colour - report::kPathColourName.begin());
-    error = input::write_file(
-        options.plot, maps ? report::maps_svg(scene, reports) : report::mission_svg(scene, reports, by));
+    input::write_file(options.plot,
+                      maps ? report::maps_svg(scene, reports) : report::mission_svg(scene, reports, by));
   }
-  if (!error.empty()) throw InputError(error);
   if (!options.json && !options.plot.empty()) fmt::print("picture: {}\n", options.plot);
   if (!options.json && !options.trace.empty()) fmt::print("trace: {}\n", options.trace);
   if (!options.json && !options.record.empty()) fmt::print("recording: {}\n", options.record);
-  return all_reached && believed ? 0 : 1;
+  return all_reached && believed ? kDone : kNotGood;
 }
 
 }  // namespace
@@ -220,14 +231,14 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
       "  roborun fly --env 27 --seed 3 --profile host --json\n"
       "  roborun fly --world house.bt --start 1,2,1.5 --goal 9,4,1.5\n\n"
       "Exit code: 0 every design reached the goal, 1 at least one did not (the table says why), or a plugin "
-      "took "
-      "more\ntime than the work that it counts is worth, 2 bad input.");
-  fly_app
-      ->add_option("--env", options->env,
-                   "Environment: 1 .. 27, or a name like density0.45-spread80-distance900")
-      ->capture_default_str();
-  fly_app->add_option("--mission", options->mission, "package_delivery or search_and_rescue")
-      ->capture_default_str();
+      "took more\ntime than the work that it counts is worth, 2 bad input.");
+  CLI::Option* env = fly_app
+                         ->add_option("--env", options->env,
+                                      "Environment: 1 .. 27, or a name like density0.45-spread80-distance900")
+                         ->capture_default_str();
+  CLI::Option* mission =
+      fly_app->add_option("--mission", options->mission, "package_delivery or search_and_rescue")
+          ->capture_default_str();
   fly_app
       ->add_option("--design", options->design,
                    "aware, static (0.5 m/s as published), static-fair; several with commas")
@@ -237,12 +248,12 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
                    "What computing costs: paper (the authors' machine), host (this one), cortex-a72 (an "
                    "estimate), or a file of roborun calibrate")
       ->capture_default_str();
-  fly_app
-      ->add_option("--host-factor", options->host_factor,
-                   "With --profile host: a machine this many times slower")
-      ->capture_default_str();
-  fly_app->add_option("--host-file", options->host_file,
-                      "With --profile host: where the measured costs are kept [~/.cache/roborun/]");
+  CLI::Option* host_factor =
+      add_number(*fly_app, "--host-factor", options->host_factor, 0.001, 1000.0,
+                 "With --profile host: a machine this many times slower, 0.001 .. 1000");
+  CLI::Option* host_file =
+      fly_app->add_option("--host-file", options->host_file,
+                          "With --profile host: where the measured costs are kept [~/.cache/roborun/]");
   fly_app->add_option("--seed", options->seed, "Seed of world, noise, wind and planner")
       ->capture_default_str();
   fly_app->add_option("--map", options->map, "own, octomap, or plugin:FILE.so")->capture_default_str();
@@ -251,7 +262,9 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
                    "own, ompl:NAME with any of OMPL's geometric planners, such as ompl:RRTstar, or "
                    "plugin:FILE.so (see platform/board/plugin.hpp)")
       ->capture_default_str();
-  fly_app->add_option("--world", options->world, "World from a file instead: .toml, or OctoMap .bt / .ot");
+  fly_app->add_option("--world", options->world, "World from a file instead: .toml, or OctoMap .bt / .ot")
+      ->excludes(env)
+      ->excludes(mission);
   fly_app->add_option("--start", options->start, "With --world: X,Y,Z in metres");
   fly_app->add_option("--goal", options->goal, "With --world: X,Y,Z in metres");
   fly_app
@@ -264,14 +277,21 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
                       "Write all inputs of the flight to this file, for roborun replay (0.3 MB a decision)");
   fly_app->add_option("--trace", options->trace, "Write every decision to this CSV file");
   fly_app->add_option("--plot", options->plot, "Write a picture of the mission to this SVG file");
-  fly_app
-      ->add_option(
-          "--color", options->colour,
-          "What colours the paths of --plot: speed, precision, volume, latency, visibility, deadline; "
-          "all: a map of each")
-      ->capture_default_str();
+  CLI::Option* colour =
+      fly_app
+          ->add_option(
+              "--color", options->colour,
+              "What colours the paths of --plot: speed, precision, volume, latency, visibility, deadline; "
+              "all: a map of each")
+          ->capture_default_str();
   fly_app->add_flag("--json", options->json, "One JSON object a design on standard output, nothing else");
-  fly_app->callback([options, &run] { run = [options] { return fly(*options); }; });
+  fly_app->callback([=, &run] {
+    const bool host = options->profile == "host";
+    refuse_alone(*host_factor, host, "--profile host");
+    refuse_alone(*host_file, host, "--profile host");
+    refuse_alone(*colour, !options->plot.empty(), "--plot FILE");
+    run = [options] { return fly(*options); };
+  });
 }
 
 }  // namespace roborun::app

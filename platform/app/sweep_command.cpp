@@ -10,10 +10,13 @@
 #include <thread>
 
 #include "core/record/state_hash.hpp"
+#include "platform/app/exit_code.hpp"
 #include "platform/board/backends.hpp"
 #include "platform/evaluation/sweep_run.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/output_file.hpp"
+#include "platform/input/stop_signal.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/settings_file.hpp"
 #include "platform/report/build_identity.hpp"
@@ -63,8 +66,10 @@ std::string profile_digest(const board::Profile& profile) {
   return fmt::format("{:016x}", hash.value());
 }
 
+constexpr std::size_t kMostProgram_bytes = 1U << 30U;
+
 std::string program_digest() {
-  return evaluation::digest_of(input::read_text("/proc/self/exe", "this program"));
+  return evaluation::digest_of(input::read_text("/proc/self/exe", "this program", kMostProgram_bytes));
 }
 
 void set_shard(const std::string& text, evaluation::SweepPlan& plan) {
@@ -113,9 +118,12 @@ evaluation::SweepPlan plan_of(const SweepOptions& options, evaluation::SweepInpu
     mission::load_settings(options.settings, inputs.base);
     plan.settings = evaluation::digest_of(input::read_text(options.settings, "a readable TOML file"));
   }
+  inputs.files = vehicle.patterns;
+  for (const std::string& path : {options.vehicle, options.settings}) inputs.files.push_back(path);
   std::vector<std::string> names;
   for (const std::string& text : input::split(options.profiles)) {
     const board::Profile profile = board::load_profile(text, {plan.map, plan.planner});
+    inputs.files.push_back(text);
     // Machines of a cluster keep the same file in different folders.
     const std::string name = std::filesystem::path(text).stem().string();
     names.push_back(name);
@@ -150,12 +158,14 @@ int sweep(const SweepOptions& options) {
   const evaluation::SweepPlan plan = plan_of(options, inputs);
   const int jobs = input::jobs_of(options.jobs);
   evaluation::try_sweep(plan, inputs);
+  evaluation::check_folder(options.out, inputs.files);
   evaluation::SweepStore store(options.out, plan);
   const bool complete = evaluation::fly_sweep(store, inputs, jobs);
   tell(store, options);
-  if (!complete)
-    fmt::print(stderr, "roborun: stopped; what was flown is kept: the same command goes on from there\n");
-  return complete ? 0 : 1;
+  constexpr const char* kKept = "what was flown is kept: the same command goes on from there";
+  if (input::StopOnSignal::requested()) throw input::Interrupted(kKept);
+  if (!complete) fmt::print(stderr, "roborun: not all was flown; {}\n", kKept);
+  return complete ? kDone : kNotGood;
 }
 
 int merge(const SweepOptions& options) {
@@ -171,7 +181,7 @@ int merge(const SweepOptions& options) {
   evaluation::merge_shards(options.merged, options.out);
   const evaluation::SweepStore store(options.out, evaluation::plan_of_folder(options.out));
   tell(store, options);
-  return store.complete() ? 0 : 1;
+  return store.complete() ? kDone : kNotGood;
 }
 
 int compare(const SweepOptions& options) {
@@ -185,7 +195,7 @@ int compare(const SweepOptions& options) {
     for (report::SweepRow& row : evaluation::rows_of(store)) rows.push_back(std::move(row));
   }
   fmt::print("{}\n{}", report::kernel_table(rows), sources);
-  return 0;
+  return kDone;
 }
 
 void add_compare_command(CLI::App& sweep_app, const std::shared_ptr<SweepOptions>& options,
@@ -238,8 +248,8 @@ void add_sweep_command(CLI::App& app, std::function<int()>& run) {
       "pictures, opens offline). Stopped by Ctrl-C or power loss, the same command goes on. Results do not\n"
       "depend on --jobs, machine or order. A folder holds the flights of one commit: another one is "
       "refused.\n"
-      "Exit code: 0 every mission was flown (whether it reached the goal is in the table), 1 stopped before "
-      "that,\n2 bad input.");
+      "Exit code: 0 every mission was flown (whether it reached the goal is in the table), 1 a flight's "
+      "process died,\n2 bad input, 130 stopped.");
   sweep_app->add_option("--suite", options->suite, "Set of environments: paper27")->capture_default_str();
   sweep_app->add_option("--environments", options->environments,
                         "Only these of the suite, by number or name, with commas [all]");

@@ -9,6 +9,7 @@
 
 #include "core/geometry/math.hpp"
 #include "governor/policy/governor.hpp"
+#include "platform/app/exit_code.hpp"
 #include "platform/board/backends.hpp"
 #include "platform/flight/flight_system.hpp"
 #include "platform/input/input_error.hpp"
@@ -106,7 +107,7 @@ int check(const VehicleOptions& options) {
     for (const auto& [speed_mps, distance_m] : c.stop)
       j["stopping"].push_back({{"speed_mps", speed_mps}, {"distance_m", distance_m}});
     fmt::print("{}\n", j.dump());
-    return 0;
+    return kDone;
   }
   fmt::print("{}: {}\n\n", vehicle.name, vehicle.about);
   fmt::print("thrust to weight     {:.2f}, hovers at {:.0f} % of full throttle\n", c.thrust_to_weight_ratio,
@@ -123,7 +124,7 @@ int check(const VehicleOptions& options) {
   fmt::print("memory               {:.1f} MiB in a world of 100 x 100 x 10 m\n",
              static_cast<double>(c.bytes) / 1048576.0);
   for (const std::string& line : cannot) fmt::print("it                   {}\n", line);
-  return 0;
+  return kDone;
 }
 
 int list(const VehicleOptions& options) {
@@ -136,7 +137,7 @@ int list(const VehicleOptions& options) {
       fmt::print("{:<8} {}\n", v.name, v.about);
   }
   if (options.json) fmt::print("{}\n", all.dump());
-  return 0;
+  return kDone;
 }
 
 }  // namespace

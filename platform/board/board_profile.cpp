@@ -363,10 +363,12 @@ Profile host(const std::string& path, const BackendNames& backends, double facto
   const std::string text = to_toml(measure_board(backends, 2, {}, sweep));
   std::error_code ignored;
   std::filesystem::create_directories(std::filesystem::path(path).parent_path(), ignored);
-  const std::string error = input::write_file(path, text);
-  note = error.empty()
-             ? fmt::format("measured this machine quickly, kept in {} (better: roborun calibrate)", path)
-             : fmt::format("measured this machine for this run only: {}", error);
+  try {
+    input::write_file(path, text);
+    note = fmt::format("measured this machine quickly, kept in {} (better: roborun calibrate)", path);
+  } catch (const InputError& error) {
+    note = fmt::format("measured this machine for this run only: {}", error.what());
+  }
   return profile_for(path, text, backends, factor);
 }
 

@@ -7,6 +7,7 @@
 
 #include "core/record/state_hash.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/json_reader.hpp"
 
 namespace roborun::evaluation {
 namespace {
@@ -71,7 +72,7 @@ std::string to_json(const SweepPlan& plan) {
 
 SweepPlan plan_from_json(const std::string& path, const std::string& text) {
   try {
-    const Json json = Json::parse(text);
+    const Json json = input::parse_json(text);
     SweepPlan p;
     p.commit = json.value("commit", "");
     p.build = json.at("build");
@@ -90,7 +91,7 @@ SweepPlan plan_from_json(const std::string& path, const std::string& text) {
                        p.shard <= p.shards && !p.environments.empty() && !p.profiles.empty() &&
                        !p.designs.empty() && !p.seeds.empty();
     if (whole) return p;
-  } catch (const nlohmann::json::exception&) {  // below
+  } catch (const std::exception&) {  // below
   }
   throw InputError(fmt::format("{}: is not a sweep's request: give a folder of roborun sweep", path));
 }

@@ -72,8 +72,7 @@ class Page {
 
  private:
   void write(const std::string& name, const std::string& text) {
-    const std::string error = input::write_file(store_.folder() + "/" + name, text);
-    if (!error.empty()) throw InputError(error);
+    input::write_file(store_.folder() + "/" + name, text);
   }
   const SweepStore& store_;
   std::string html_;

@@ -235,8 +235,10 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
     const Vector3 before_W = aircraft_.vehicle().state().p_WB;
     begin_faults();
     const MonotonicTime now = flight_.now() + config_.flight.minor_frame;
-    if (const flight::DecisionOutput* decision = flight_.step(faults_.computer(now)))
+    if (const flight::DecisionOutput* decision = flight_.step(faults_.computer(now))) {
       record_decision(*decision);
+      if (recorder_) recorder_->check();
+    }
     refuse_silence();
     const sitl::VehicleState& s = aircraft_.vehicle().state();
     report_.result.distance_m += (s.p_WB - before_W).norm();

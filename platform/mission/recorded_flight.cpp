@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "platform/input/input_error.hpp"
+#include "platform/input/json_reader.hpp"
 
 namespace roborun::mission {
 namespace {
@@ -175,8 +176,7 @@ std::string to_json(const RecordedFlight& recorded) {
 }
 
 RecordedFlight recorded_flight_from(std::span<const std::byte> json) {
-  const auto* text = reinterpret_cast<const char*>(json.data());
-  const Json j = Json::parse(text, text + json.size());
+  const Json j = input::parse_json({reinterpret_cast<const char*>(json.data()), json.size()});
   if (j.at("roborun_recording") != kVersion) throw InputError("of another version");
   RecordedFlight recorded;
   flight::FlightConfig& flight = recorded.flight;

@@ -163,10 +163,12 @@ void read_settings(const input::TomlReader& reader, const toml::table& root, Mis
     const toml::table* table = section(reader, root, key.table, keys_of(key.table));
     const toml::node* node = table == nullptr ? nullptr : table->get(key.key);
     if (node == nullptr) continue;
-    const double value = reader.number(*node, key.key, key.low, key.high);
-    if (key.whole && value != std::floor(value)) reader.refuse(*node, key.key, "must be a whole number");
-    key.set(config, value);
+    key.set(config, key.whole ? reader.whole(*node, key.key, key.low, key.high)
+                              : reader.number(*node, key.key, key.low, key.high));
   }
+  if (const toml::table* t = section(reader, root, "cpu", keys_of("cpu")); t != nullptr && t->size() == 1)
+    reader.refuse(t->begin()->second, t->begin()->first.str(),
+                  "goes with the other key of [cpu]: slow_down_at_s and slow_down_factor");
   if (const toml::table* t = section(reader, root, "wind", keys_of("wind"))) {
     if (const toml::node* mean = t->get("mean_mps")) {
       config.simulator.wind.mean_W_mps = reader.point(*mean, "mean_mps");

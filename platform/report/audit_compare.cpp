@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "platform/report/shallow_json.hpp"
+#include "platform/input/json_reader.hpp"
 
 namespace roborun::report {
 namespace {
@@ -31,8 +31,13 @@ bool is_one_of(const auto& names, const std::string& name) {
 }
 
 Json parse(const std::string& text) {
-  Json j = parse_shallow(text);
-  if (j.is_discarded() || !j.is_object() || !j.contains("slots") || !j.contains("lanes"))
+  Json j;
+  try {
+    j = input::parse_json(text);
+  } catch (const InputError& error) {
+    throw std::invalid_argument(fmt::format("is not the JSON of an audit: {}", error.what()));
+  }
+  if (!j.is_object() || !j.contains("slots") || !j.contains("lanes"))
     throw std::invalid_argument("is not the JSON of an audit");
   if (!j.contains("verdict"))
     throw std::invalid_argument("is of an audit that did not write down what was flown: must be flown again");

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "platform/input/json_reader.hpp"
+
 namespace roborun::report {
 namespace {
 

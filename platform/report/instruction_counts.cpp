@@ -2,17 +2,19 @@
 
 #include <stdexcept>
 
-#include "platform/report/shallow_json.hpp"
+#include "platform/input/json_reader.hpp"
 
 namespace roborun::report {
 
 InstructionCounts instruction_counts(const std::string& json) {
-  const nlohmann::ordered_json all = parse_shallow(json);
   InstructionCounts counts;
   try {
+    const nlohmann::ordered_json all = input::parse_json(json);
     counts.commit = all.at("commit");
     for (const auto& [slot, figures] : all.at("slots").items())
       counts.worst[slot] = figures.at("worst").get<std::uint64_t>();
+  } catch (const InputError& error) {
+    throw std::invalid_argument(error.what());
   } catch (const nlohmann::json::exception&) {
     throw std::invalid_argument("must be what toolchain/bench/run instructions --update writes");
   }

@@ -117,10 +117,9 @@ class VehicleReader {
       known.insert(key.key);
       if (is_mount(key.key) && from.get(key.key) == nullptr) continue;
       const toml::node& node = reader_.need(from, key.key, where);
-      const double value = reader_.number(node, key.key, key.low, key.high);
-      if (is_whole(key.key) && value != std::floor(value))
-        reader_.refuse(node, key.key, "must be a whole number");
-      (void)assign(key, sensor, value);
+      (void)assign(key, sensor,
+                   is_whole(key.key) ? reader_.whole(node, key.key, key.low, key.high)
+                                     : reader_.number(node, key.key, key.low, key.high));
     }
     if (where == "[[lidar]]") known.insert("pattern");
     reader_.allow_keys(from, where, known);

@@ -4,13 +4,14 @@
 
 #include <array>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <limits>
+#include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
 #include "platform/input/input_error.hpp"
+#include "platform/input/text_file.hpp"
 #include "platform/input/toml_reader.hpp"
 #include "platform/sitl/world/body_reader.hpp"
 #include "platform/sitl/world/octomap_file.hpp"
@@ -18,7 +19,6 @@
 namespace roborun::sitl {
 namespace {
 
-constexpr std::size_t kMaxFile_bytes = 64U << 20U;
 constexpr std::size_t kMaxObjects = 100000;
 constexpr double kVehicleRadius_m = 0.6;
 constexpr double kPillarTop_m = 20.0;
@@ -38,19 +38,12 @@ constexpr std::array<WorldKey, 10> kKeys{
      {"box", "min", "[x, y, z], m", {}, "lowest corner of a box along the axes"},
      {"box", "max", "[x, y, z], m, above min", {}, "highest corner"}}};
 
-std::vector<unsigned char> read_file(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-    throw InputError(fmt::format("{}: cannot be opened: must be a readable .toml, .bt or .ot file", path));
-  std::vector<unsigned char> bytes;
-  std::array<char, 1U << 16U> block{};
-  while (file.read(block.data(), block.size()) || file.gcount() > 0) {
-    bytes.insert(bytes.end(), block.begin(), block.begin() + file.gcount());
-    if (bytes.size() > kMaxFile_bytes) throw InputError(fmt::format("{}: larger than 64 MiB", path));
-  }
-  if (file.bad())
-    throw InputError(fmt::format("{}: cannot be read: must be a readable .toml, .bt or .ot file", path));
-  return bytes;
+std::string read_file(const std::string& path) {
+  return input::read_text(path, "a readable .toml, .bt or .ot file");
+}
+
+std::span<const unsigned char> bytes_of(const std::string& text) {
+  return {reinterpret_cast<const unsigned char*>(text.data()), text.size()};
 }
 
 void read_pillars(const input::TomlReader& reader, const toml::table& root, WorldDescription& world) {
@@ -90,10 +83,8 @@ void read_boxes(const input::TomlReader& reader, const toml::table& root, WorldD
   }
 }
 
-WorldDescription read_toml(const std::string& path, const std::vector<unsigned char>& bytes,
-                           const Endpoints& endpoints) {
-  const toml::table root =
-      input::parse_toml(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+WorldDescription read_toml(const std::string& path, const std::string& text, const Endpoints& endpoints) {
+  const toml::table root = input::parse_toml(path, text);
   const input::TomlReader reader(path);
   reader.allow_keys(root, "the file", {"world", "pillar", "box", "body"});
   const toml::table* table = reader.need(root, "world", "the file").as_table();
@@ -137,10 +128,10 @@ Vector3 roomiest(const VoxelGrid& voxels, const Aabb& bounds_W, bool at_low_end)
   return best_W;
 }
 
-WorldDescription read_octomap(const std::string& path, const std::vector<unsigned char>& bytes, bool full,
+WorldDescription read_octomap(const std::string& path, const std::string& text, bool full,
                               const Endpoints& endpoints) {
   WorldDescription world;
-  world.voxels = parse_octomap(bytes, full, path);
+  world.voxels = parse_octomap(bytes_of(text), full, path);
   world.bounds_W = world.voxels.bounds_W();
   // The simulator's ground is z = 0: maps that reach below it keep their voxels there, but nobody flies
   // there.
@@ -163,7 +154,7 @@ std::vector<WorldKey> world_keys() {
 
 OctomapLeaves load_octomap(const std::string& path) {
   const bool full = is_full_octomap(path);
-  return read_octomap(read_file(path), full, path);
+  return read_octomap(bytes_of(read_file(path)), full, path);
 }
 
 World load_world(const std::string& path, const Endpoints& endpoints) {
@@ -175,8 +166,8 @@ World load_world(const std::string& path, const Endpoints& endpoints) {
   const bool ot = ends_with(".ot");
   if (!toml && !bt && !ot)
     throw InputError(fmt::format("{}: unknown kind of world file: must end in .toml, .bt or .ot", path));
-  const std::vector<unsigned char> bytes = read_file(path);
-  World world(toml ? read_toml(path, bytes, endpoints) : read_octomap(path, bytes, ot, endpoints));
+  const std::string text = read_file(path);
+  World world(toml ? read_toml(path, text, endpoints) : read_octomap(path, text, ot, endpoints));
   for (const auto& [name, p_W] : {std::pair{"start", world.start_W()}, std::pair{"goal", world.goal_W()}}) {
     if (world.clearance_m(p_W, kVehicleRadius_m) < kVehicleRadius_m) {
       throw InputError(

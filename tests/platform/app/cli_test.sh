@@ -45,7 +45,7 @@ refuses "cannot be loaded" calibrate --repeats 1 --planner plugin:nope.so
 refuses "must go with --host-file" fly --profile host --planner plugin:nope.so
 refuses "must be those that ship" sweep --planner plugin:nope.so --out /tmp/roborun_cli_test_sweep.$$
 refuses "must be own or ompl:NAME" fly --planner ompl:Foo
-refuses "deadline or all" fly --color red
+refuses "deadline or all" fly --plot x.svg --color red
 refuses "package_delivery or search_and_rescue" fly --mission x
 refuses "cannot be opened" fly --world nope.toml
 refuses "must end in .toml, .bt or .ot" fly --world nope.xyz
@@ -107,7 +107,7 @@ vehicle ": radius_m: must be a number from 0.05 to 2" 's/^radius_m = .*/radius_m
 vehicle ": battery_J: must be a number from 1000 to 1000000000" 's/^battery_J = .*/battery_J = 1e30/'
 vehicle "cannot stop within what it sees" 's/^range_m = .*/range_m = 1/; s/^tracking_error_m = .*/tracking_error_m = 1/'
 vehicle "must look within 45 degrees of forward" 's/^x_m = .*/yaw_deg = 180/'
-vehicle ": width: must be a whole number" 's/^width = .*/width = 96.5/'
+vehicle ": width: must be a whole number from" 's/^width = .*/width = 96.5/'
 vehicle ": mass_kg: missing in [body]" 's/^mass_kg = .*//'
 vehicle "drak: unknown key" 's/^.drag.$/[drak]/'
 rm -f /tmp/roborun_vehicle.$$.toml
@@ -171,7 +171,7 @@ rm -f /tmp/roborun_audit14.$$ /tmp/roborun_audit3.$$
 printf '[world]\nbounds = [[0,0,0],[9,9,9]]\nstart = [1,1,1]\ngoal = [5,5,5]\nwalls = 3\n' >/tmp/roborun_bad.$$.toml
 refuses ":5: walls: unknown key" fly --world /tmp/roborun_bad.$$.toml
 printf '[camera]\npixels = 9999\n' >/tmp/roborun_bad.$$.toml
-refuses ":2: pixels: must be a number from 8 to 1280" fly --settings /tmp/roborun_bad.$$.toml
+refuses ":2: pixels: must be a whole number from 8 to 1280" fly --settings /tmp/roborun_bad.$$.toml
 rm -f /tmp/roborun_cli_test.$$ /tmp/roborun_bad.$$.toml
 echo "$passed passed, $failed failed"
 [[ $failed -eq 0 && $passed -gt 15 ]]

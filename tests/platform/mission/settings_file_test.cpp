@@ -23,6 +23,9 @@ TEST(Settings, OverwritesWhatIsThereAndKeepsTheRest) {
 TEST(Settings, RefusesWithFileLineKeyAndRange) {
   const std::pair<const char*, const char*> cases[] = {
       {"[camera]\nrange_m = 1000\n", ":2: range_m: must be a number from 5 to 100"},
+      {"[camera]\npixels = 96.5\n", ":2: pixels: must be a whole number from 8 to 1280"},
+      {"[cpu]\nslow_down_factor = 2\n", ":2: slow_down_factor: goes with the other key"},
+      {"[cpu]\nslow_down_at_s = 2\n", ":2: slow_down_at_s: goes with the other key"},
       {"[camera]\nrange = 10\n", ":2: range: unknown key in [camera]"},
       {"[wind]\nmean_mps = [30, 0, 0]\n", ":2: mean_mps: must be at most 20 m/s"},
       {"[engine]\n", "engine: unknown key in the file"},

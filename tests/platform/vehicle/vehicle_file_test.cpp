@@ -84,7 +84,7 @@ TEST(VehicleFile, RefusesSensorsThatCannotBe) {
     return refusal(paper + replaced(kCamera, what, instead));
   };
   EXPECT_EQ(refusal(paper + kCamera), "");
-  EXPECT_NE(with("width = 640", "width = 1281").find("width: must be a number from 8 to 1280"),
+  EXPECT_NE(with("width = 640", "width = 1281").find("width: must be a whole number from 8 to 1280"),
             std::string::npos);
   EXPECT_NE(with("width = 640", "width = 64.5").find("width: must be a whole number"), std::string::npos);
   EXPECT_NE(with("vertical_fov_deg = 58", "vertical_fov_deg = 0").find("vertical_fov_deg: must be"),
