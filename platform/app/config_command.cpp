@@ -1,10 +1,12 @@
 #include "platform/app/config_command.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "core/sensor_rig.hpp"
 #include "platform/app/exit_code.hpp"
 #include "platform/input/key_text.hpp"
 #include "platform/mission/settings_file.hpp"
@@ -68,7 +70,10 @@ int config(bool json) {
       "# key, unit, range, default, meaning\n\n{}\n"
       "Besides: [wind] mean_mps = [x, y, z], at most 20 m/s (default 1.5, 1, 0); [fence] altitude_m = [low, "
       "high],\n"
-      "keep_in and keep_out = [{{ polygon = [[x, y], ...] }}, {{ circle = [x, y, radius] }}].\n\n",
+      "keep_in and keep_out = [{{ polygon = [[x, y], ...] }}, {{ circle = [x, y, radius] }}]; the models of "
+      "all sensors "
+      "of a kind,\n"
+      "as below: [camera], [lidar], [imu] and [gnss] model = NAME.\n\n",
       input::reference_of(settings));
   fmt::print(
       "# Vehicles: --vehicle FILE. No key may be left out; the numbers shown as defaults are those of "
@@ -76,8 +81,13 @@ int config(bool json) {
       "# and of a camera and a LiDAR that are not its own. One [[camera]] or [[lidar]] per sensor.\n\n{}\n"
       "Besides: [vehicle] name, about; [stopping] quadratic_s2pm, linear_s, constant_m, where the stop was "
       "measured;\n"
-      "[[lidar]] pattern = FILE, a line \"azimuth_deg elevation_deg\" per direction.\n",
-      input::reference_of(vehicle));
+      "[[lidar]] pattern = FILE, a line \"azimuth_deg elevation_deg\" per direction. Which errors the "
+      "simulator gives a "
+      "sensor:\n"
+      "model = NAME, default clean; [[camera]] {}, with invalid_ratio from 0 to {:g} (default {:g});\n"
+      "[[lidar]] {}; [imu] {}; [gnss] {}.\n",
+      input::reference_of(vehicle), fmt::join(kCameraModels, ", "), kMostInvalid, CameraSpec{}.invalid_ratio,
+      fmt::join(kLidarModels, ", "), fmt::join(kImuModels, ", "), fmt::join(kGnssModels, ", "));
   fmt::print(
       "\n# Worlds: --world FILE.toml (or an OctoMap .bt, .ot: every leaf that it calls occupied is solid; "
       "without "

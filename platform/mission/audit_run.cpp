@@ -288,6 +288,7 @@ RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
       lanes_(lane_config(config), clock_, reactions_, {&noted_[0], &noted_[1], &noted_[2], &noted_[3]}),
       evidence_(config) {
   setup_.check();
+  aircraft_.stand_in(world);
   meter_.attach(lanes_.lane(core::LaneId::kDecision));
   watchdog_.watch(lanes_.lane(core::LaneId::kFlight), lanes_.lane(core::LaneId::kDecision));
 }

@@ -62,6 +62,8 @@ flight::FlightConfig flight_config_of(const sitl::World& world, const MissionCon
 void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle) {
   config.flight.vehicle = vehicle.model;
   config.simulator.rig = vehicle.rig;
+  config.simulator.sensors.imu = vehicle.rig.imu;
+  config.simulator.sensors.gnss = vehicle.rig.gnss;
   config.simulator.lidar_patterns.clear();
   for (std::size_t i = 0; i < vehicle.rig.lidars.size(); ++i) {
     auto& pattern = config.simulator.lidar_patterns.emplace_back();

@@ -110,6 +110,7 @@ Json sensors_json(const Sensors& sensors) {
   for (const auto& sensor : sensors) {
     Json one;
     for (const auto& key : keys_of(sensor)) one[key.key] = key.get(sensor);
+    if (sensor.model != decltype(sensor.model){}) one["model"] = to_string(sensor.model);
     list.push_back(std::move(one));
   }
   return list;
@@ -120,6 +121,10 @@ void read_sensors(const Json& list, core::StaticVector<Spec, N>& sensors) {
   for (const Json& one : list) {
     Spec spec;
     for (const SensorKey<Spec>& key : keys_of(spec)) key.set(spec, number(one, key.key, key.low, key.high));
+    using Model = decltype(spec.model);
+    const auto model = model_of<Model>(one.value("model", to_string(Model{})));
+    if (!model) throw InputError("model: no name of a sensor model");
+    spec.model = *model;
     if (!sensors.push_back(spec)) throw InputError(fmt::format("must be at most {} sensors of a kind", N));
   }
 }

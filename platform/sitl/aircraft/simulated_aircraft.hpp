@@ -55,6 +55,8 @@ class SimulatedAircraft final : public flight::Aircraft {
     sensors_.connect(&line);
     far_side_.connect(&line);
   }
+  /// What hides the sky from its receiver; it must outlive the aircraft.
+  void stand_in(const World& world) noexcept { sensors_.stand_in(world); }
   /// A twin for tests: the kill switch has no effect.
   void ignore_kill_switch() noexcept { actuators_.ignore_kill_switch(); }
 

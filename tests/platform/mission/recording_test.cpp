@@ -128,6 +128,20 @@ TEST_F(Replay, HoldsDifferentCamerasAndALidar) {
       << "recording changed the flight";
 }
 
+TEST_F(Replay, HoldsTheModelsOfItsSensors) {
+  config_.simulator.rig = two_cameras_and_a_lidar();
+  config_.simulator.rig->cameras[0].model = CameraModel::kD455;
+  config_.simulator.rig->lidars[0].model = LidarModel::kMid360;
+  config_.simulator.sensors.imu = ImuModel::kMems;
+  config_.simulator.sensors.gnss = GnssModel::kM9n;
+  const ReplayResult r = replay_flight(record(), {});
+  EXPECT_TRUE(r.same()) << "frame " << r.diverged_in << " of " << r.recorded.minor_frames;
+  const RecordedFlight flight = Recording(config_.record).flight();
+  EXPECT_EQ(flight.sensors.cameras[0].model, CameraModel::kD455);
+  EXPECT_EQ(flight.sensors.cameras[1].model, CameraModel::kClean);
+  EXPECT_EQ(flight.sensors.lidars[0].model, LidarModel::kMid360);
+}
+
 TEST_F(Replay, HoldsAVehicleWhoseStoppingNobodyMeasured) {
   set_vehicle(config_, vehicle::load_vehicle("x500"));
   ASSERT_FALSE(config_.flight.vehicle.measured_stopping.has_value()) << "else nothing is tested";
