@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "platform/app/world_arguments.hpp"
 #include "platform/board/board_profile.hpp"
 #include "platform/evaluation/scene.hpp"
 #include "platform/input/arguments.hpp"
@@ -36,8 +37,7 @@ struct FlyOptions {
   std::string map{"own"};
   std::string planner{"own"};
   std::string world;
-  std::string start;
-  std::string goal;
+  WorldArguments in_file;
   std::string vehicle{"paper"};
   std::string settings;
   std::string host_file;
@@ -48,21 +48,6 @@ struct FlyOptions {
   std::string colour{"speed"};
   bool json{false};
 };
-
-std::optional<Vector3> point_of(const char* option, const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  const std::vector<std::string> parts = input::split(text);
-  Vector3 p_W = Vector3::Zero();
-  bool ok = parts.size() == 3;
-  for (std::size_t i = 0; ok && i < 3; ++i) {
-    char* end = nullptr;
-    p_W[static_cast<Eigen::Index>(i)] = std::strtod(parts[i].c_str(), &end);
-    ok = !parts[i].empty() && *end == '\0';
-  }
-  if (!ok || !is_finite(p_W))
-    throw InputError(fmt::format("{}: '{}' is not a point: must be X,Y,Z in metres", option, text));
-  return p_W;
-}
 
 board::Profile profile_of(const FlyOptions& options) {
   if (!(options.host_factor > 0.0 && options.host_factor <= 1000.0)) {
@@ -101,18 +86,18 @@ int fly(const FlyOptions& options) {
   mission::MissionConfig config;
   mission::set_vehicle(config, vehicle::load_vehicle(options.vehicle));
   if (!options.settings.empty()) mission::load_settings(options.settings, config);
-  const sitl::Endpoints endpoints{point_of("--start", options.start), point_of("--goal", options.goal)};
   std::string env;
   std::string title;
   double zone_m = 0.0;
   std::unique_ptr<sitl::World> world;
   if (!options.world.empty()) {
-    world = std::make_unique<sitl::World>(sitl::load_world(options.world, endpoints));
+    world = std::make_unique<sitl::World>(
+        sitl::load_world(options.world, world_options(options.in_file, config.flight.vehicle.radius_m)));
     env = options.world;
     title = fmt::format("{}, seed {}", options.world, seed);
   } else {
-    if (endpoints.start_W || endpoints.goal_W)
-      throw InputError("--start and --goal go with --world FILE: the environments have their own");
+    if (any_given(options.in_file))
+      throw InputError("--start, --goal and the like go with --world FILE: the environments have their own");
     const sitl::NamedEnvironment named = sitl::environment(options.env);
     world = std::make_unique<sitl::World>(sitl::generate(named.knobs, mission, seed));
     env = fmt::format("{}", named.number);
@@ -215,9 +200,11 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
                    "own, ompl:NAME with any of OMPL's geometric planners, such as ompl:RRTstar, or "
                    "plugin:FILE.so (see platform/board/plugin.hpp)")
       ->capture_default_str();
-  fly_app->add_option("--world", options->world, "World from a file instead: .toml, or OctoMap .bt / .ot");
-  fly_app->add_option("--start", options->start, "With --world: X,Y,Z in metres");
-  fly_app->add_option("--goal", options->goal, "With --world: X,Y,Z in metres");
+  fly_app->add_option(
+      "--world", options->world,
+      "World from a file instead: .toml, OctoMap .bt / .ot, SDF .world / .sdf, points .pcd / .ply / .las, "
+      "meshes .stl / .obj / .dae");
+  add_world_arguments(*fly_app, options->in_file);
   fly_app
       ->add_option("--vehicle", options->vehicle,
                    "Vehicle: a shipped one (roborun vehicle list), or a vehicle file")

@@ -23,6 +23,7 @@
 #include "platform/app/solve_command.hpp"
 #include "platform/app/sweep_command.hpp"
 #include "platform/app/vehicle_command.hpp"
+#include "platform/app/world_command.hpp"
 #include "platform/input/input_error.hpp"
 
 namespace {
@@ -62,6 +63,7 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   roborun::app::add_replay_command(app, run);
   roborun::app::add_vehicle_command(app, run);
   roborun::app::add_config_command(app, run);
+  roborun::app::add_world_command(app, run);
   try {
     app.parse(argc, argv);
     return run ? run() : 2;

@@ -181,6 +181,7 @@ RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
       lanes_(lane_config(config), clock_, reactions_,
              {&program_[0], &program_[1], &program_[2], &program_[3]}) {
   setup_.check();
+  aircraft_.stand_in(world);
   meter_.attach(lanes_.lane(core::LaneId::kDecision));
   watchdog_.watch(lanes_.lane(core::LaneId::kFlight), lanes_.lane(core::LaneId::kDecision));
 }

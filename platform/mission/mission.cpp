@@ -93,6 +93,7 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
       system_(flight_.system()),
       judge_(config.judge, flight_config_.fence, flight_config_.vehicle.radius_m, world, aircraft_, system_) {
   setup_.check();
+  aircraft_.stand_in(world);
   if (!faults_.empty()) aircraft_.connect(faults_.line());
   if (!config.flight.answers) aircraft_.ignore_kill_switch();
 }

@@ -35,6 +35,7 @@ struct VehicleState {
 /// Deterministic: own random numbers, no libm. One minor frame costs well under 2 us.
 class Vehicle final : public firmware_if::Motors {
  public:
+  /// Stands at `p_WB`.
   Vehicle(const VehicleModel& model, const WindConfig& wind, const Vector3& p_WB,
           std::uint64_t seed) noexcept;
 
@@ -42,6 +43,9 @@ class Vehicle final : public firmware_if::Motors {
   /// Advances by dt in substeps of at most 1.25 ms. An empty battery gives no thrust.
   void step(Nanos dt) noexcept;
   [[nodiscard]] const VehicleState& state() const noexcept { return state_; }
+  /// Height of the surface below it, on which it stands: until then that of the start.
+  void set_ground(double ground_m) noexcept { ground_m_ = ground_m; }
+  [[nodiscard]] double ground_m() const noexcept { return ground_m_; }
   /// From now on; gusts go on where they are.
   void set_mean_wind(const Vector3& mean_W_mps) noexcept { wind_.mean_W_mps = mean_W_mps; }
   [[nodiscard]] Pose X_WB() const noexcept { return {state_.q_WB.toRotationMatrix(), state_.p_WB}; }
@@ -55,6 +59,7 @@ class Vehicle final : public firmware_if::Motors {
   VehicleModel model_;
   WindConfig wind_;
   VehicleState state_;
+  double ground_m_{0.0};
   firmware_if::MotorCommand command_{};
   Vector3 gust_W_mps_ = Vector3::Zero();
   Vector3 wind_W_mps_ = Vector3::Zero();

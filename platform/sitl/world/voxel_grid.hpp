@@ -21,6 +21,11 @@ class VoxelGrid {
 
   /// Marks voxels [first, first + size)^3, clipped to the grid.
   void fill(const std::array<std::int64_t, 3>& first, std::int64_t size);
+  /// All lengths times this, about the origin.
+  void scale(double factor) noexcept {
+    min_W_ *= factor;
+    cell_m_ *= factor;
+  }
   [[nodiscard]] bool empty() const noexcept { return bits_.empty(); }
   [[nodiscard]] double cell_m() const noexcept { return cell_m_; }
   [[nodiscard]] Aabb bounds_W() const noexcept;
