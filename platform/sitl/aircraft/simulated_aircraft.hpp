@@ -49,7 +49,9 @@ class SimulatedAircraft final : public flight::Aircraft {
         cameras_(cameras),
         far_side_(seed, outside),
         actuators_(minor_frame, far_side_.bus(), far_side_.kill_open(), far_side_.kill_closed()),
-        minor_frame_(minor_frame) {}
+        minor_frame_(minor_frame) {
+    vehicle_.set_ground(ground_W.z());
+  }
 
   /// All that can fail is connected to the line, which must outlive the aircraft.
   void connect(const FaultLine& line) noexcept {

@@ -134,29 +134,55 @@ double least_between_m(double a_m, double b_m, double length_m) {
   return std::sqrt(std::max(a_m * a_m - meet_m * meet_m, 0.0));
 }
 
+enum class Part : std::uint8_t { kKnown, kDivide, kStop };
+
+struct End {
+  Vector3 p_W;
+  double clearance_m;
+};
+
+/// Divides the line from a to b until `is_known` says of each part that its ends tell enough; false as soon as it says
+/// that no more is asked for. Parts come in order.
+template <typename Function>
+bool divide(const Lattice& lattice, const End& a, const End& b, Function&& is_known) {
+  constexpr std::size_t kDeepest = 40;
+  std::array<End, kDeepest> waiting;  // far ends of the parts to come
+  std::size_t count = 0;
+  End from = a;
+  waiting[count++] = b;
+  while (count > 0) {
+    const End& to = waiting[count - 1];
+    const Part part = is_known(from, to);
+    if (part == Part::kStop) return false;
+    if (part == Part::kDivide && count < kDeepest) {
+      const Vector3 middle_W = 0.5 * (from.p_W + to.p_W);
+      waiting[count++] = {middle_W, lattice.exact_m(middle_W)};
+      continue;
+    }
+    from = to;
+    --count;
+  }
+  return true;
+}
 /// Whether a ball gets straight from a to b, to kSlack_m. Where the ends alone do not tell, the middle is looked at.
-bool is_free(const Lattice& lattice, const Vector3& a_W, double a_m, const Vector3& b_W, double b_m,
-             double radius_m) {
-  if (std::min(a_m, b_m) < radius_m - kExact_m) return false;
-  const double length_m = (b_W - a_W).norm();
-  if (least_between_m(a_m, b_m, length_m) >= radius_m - std::min(kSlack_m, 0.05 * radius_m)) return true;
-  const Vector3 middle_W = 0.5 * (a_W + b_W);
-  const double middle_m = lattice.exact_m(middle_W);
-  return is_free(lattice, a_W, a_m, middle_W, middle_m, radius_m) &&
-         is_free(lattice, middle_W, middle_m, b_W, b_m, radius_m);
+bool is_free(const Lattice& lattice, const End& a, const End& b, double radius_m) {
+  const double enough_m = radius_m - std::min(kSlack_m, 0.05 * radius_m);
+  return divide(lattice, a, b, [&](const End& from, const End& to) {
+    if (std::min(from.clearance_m, to.clearance_m) < radius_m - kExact_m) return Part::kStop;
+    const double least_m = least_between_m(from.clearance_m, to.clearance_m, (to.p_W - from.p_W).norm());
+    return least_m >= enough_m ? Part::kKnown : Part::kDivide;
+  });
 }
 
-/// The least clearance between a and b, as long as it is below `most_m`; at most `slack_m` too much.
-double width_m(const Lattice& lattice, const Vector3& a_W, double a_m, const Vector3& b_W, double b_m,
-               double most_m, double slack_m) {
-  const double length_m = (b_W - a_W).norm();
-  const double ends_m = std::min({a_m, b_m, most_m});
-  if (ends_m <= slack_m || length_m < kShortest_m || least_between_m(a_m, b_m, length_m) >= ends_m - slack_m)
-    return ends_m;
-  const Vector3 middle_W = 0.5 * (a_W + b_W);
-  const double middle_m = lattice.exact_m(middle_W);
-  const double half_m = width_m(lattice, a_W, a_m, middle_W, middle_m, ends_m, slack_m);
-  return width_m(lattice, middle_W, middle_m, b_W, b_m, half_m, slack_m);
+/// The least clearance between a and b, as long as it is below `most_m`; to a millimetre.
+double width_m(const Lattice& lattice, const End& a, const End& b, double most_m) {
+  (void)divide(lattice, a, b, [&](const End& from, const End& to) {
+    most_m = std::min({most_m, from.clearance_m, to.clearance_m});
+    const double length_m = (to.p_W - from.p_W).norm();
+    const double least_m = least_between_m(from.clearance_m, to.clearance_m, length_m);
+    return length_m < kShortest_m || least_m >= most_m - kShortest_m ? Part::kKnown : Part::kDivide;
+  });
+  return most_m;
 }
 
 std::vector<Vector3> way_to(Lattice& lattice, Index index) {
@@ -229,7 +255,7 @@ void find_widest(Lattice& lattice, Progress& progress, WayVerdict& verdict) {
   for (std::size_t i = 1; i < verdict.widest_W.size(); ++i) {
     const Vector3& a_W = verdict.widest_W[i - 1];
     const Vector3& b_W = verdict.widest_W[i];
-    const double m = width_m(lattice, a_W, lattice.exact_m(a_W), b_W, lattice.exact_m(b_W), least_m, 1e-3);
+    const double m = width_m(lattice, {a_W, lattice.exact_m(a_W)}, {b_W, lattice.exact_m(b_W)}, least_m);
     if (m < least_m) verdict.narrowest_W = 0.5 * (a_W + b_W);
     least_m = std::min(least_m, m);
   }
@@ -237,7 +263,7 @@ void find_widest(Lattice& lattice, Progress& progress, WayVerdict& verdict) {
 }
 
 bool sees(const Lattice& lattice, const Vector3& a_W, const Vector3& b_W, double radius_m) {
-  return is_free(lattice, a_W, lattice.exact_m(a_W), b_W, lattice.exact_m(b_W), radius_m);
+  return is_free(lattice, {a_W, lattice.exact_m(a_W)}, {b_W, lattice.exact_m(b_W)}, radius_m);
 }
 
 /// Corners that are not needed are left out.
@@ -290,8 +316,9 @@ void find_shortest(Lattice& lattice, double radius_m, Progress& progress, WayVer
     if (place.closed || entry.length_m != static_cast<double>(place.value)) continue;
     const Vector3 here_W = lattice.position_W(index);
     const double here_m = lattice.clearance_m(index);
-    if (place.parent != kNone && !is_free(lattice, lattice.position_W(place.parent),
-                                          lattice.clearance_m(place.parent), here_W, here_m, radius_m)) {
+    if (place.parent != kNone &&
+        !is_free(lattice, {lattice.position_W(place.parent), lattice.clearance_m(place.parent)},
+                 {here_W, here_m}, radius_m)) {
       // It does not: the best of the neighbours that are done with, then.
       double best_m = std::numeric_limits<double>::infinity();
       Index best = kNone;
@@ -300,7 +327,7 @@ void find_shortest(Lattice& lattice, double radius_m, Progress& progress, WayVer
         if (!other.closed) return;
         const double length_m = static_cast<double>(other.value) + (next_W - here_W).norm();
         if (length_m >= best_m ||
-            !is_free(lattice, next_W, lattice.clearance_m(next, next_W), here_W, here_m, radius_m))
+            !is_free(lattice, {next_W, lattice.clearance_m(next, next_W)}, {here_W, here_m}, radius_m))
           return;
         best_m = length_m;
         best = next;

@@ -17,7 +17,6 @@ Vehicle::Vehicle(const VehicleModel& model, const WindConfig& wind, const Vector
                  std::uint64_t seed) noexcept
     : model_(model), wind_(wind), rng_(seed, 2) {
   state_.p_WB = p_WB;
-  ground_m_ = p_WB.z();
 }
 
 Status Vehicle::command(const firmware_if::MotorCommand& command) noexcept {

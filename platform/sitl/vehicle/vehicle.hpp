@@ -35,7 +35,6 @@ struct VehicleState {
 /// Deterministic: own random numbers, no libm. One minor frame costs well under 2 us.
 class Vehicle final : public firmware_if::Motors {
  public:
-  /// Stands at `p_WB`.
   Vehicle(const VehicleModel& model, const WindConfig& wind, const Vector3& p_WB,
           std::uint64_t seed) noexcept;
 
@@ -43,7 +42,7 @@ class Vehicle final : public firmware_if::Motors {
   /// Advances by dt in substeps of at most 1.25 ms. An empty battery gives no thrust.
   void step(Nanos dt) noexcept;
   [[nodiscard]] const VehicleState& state() const noexcept { return state_; }
-  /// Height of the surface below it, on which it stands: until then that of the start.
+  /// Height of the surface below it, on which it can stand; 0 until then.
   void set_ground(double ground_m) noexcept { ground_m_ = ground_m; }
   [[nodiscard]] double ground_m() const noexcept { return ground_m_; }
   /// From now on; gusts go on where they are.

@@ -2,7 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
-#include <map>
+#include <utility>
 
 #include "core/geometry/math.hpp"
 #include "platform/sitl/world/byte_reader.hpp"
@@ -127,16 +127,21 @@ class Collada {
     }
     return X;
   }
-  void add_nodes(const Element& of, const Matrix4& X_W) {
-    for (const Element* node = of.FirstChildElement("node"); node != nullptr;
-         node = node->NextSiblingElement("node")) {
-      const Matrix4 here = X_W * transform(*node);
-      for (const char* kind : {"instance_node", "instance_controller"})
-        if (const Element* e = node->FirstChildElement(kind)) xml_.refuse(*e, "is not read");
-      for (const Element* e = node->FirstChildElement("instance_geometry"); e != nullptr;
-           e = e->NextSiblingElement("instance_geometry"))
-        add_geometry(geometry(*e), here);
-      add_nodes(*node, here);
+  void add_nodes(const Element& scene, const Matrix4& X_W) {
+    std::vector<std::pair<const Element*, Matrix4>> waiting{{&scene, X_W}};
+    while (!waiting.empty()) {
+      const auto [of, X_of] = waiting.back();
+      waiting.pop_back();
+      for (const Element* node = of->FirstChildElement("node"); node != nullptr;
+           node = node->NextSiblingElement("node")) {
+        const Matrix4 here = X_of * transform(*node);
+        for (const char* kind : {"instance_node", "instance_controller"})
+          if (const Element* e = node->FirstChildElement(kind)) xml_.refuse(*e, "is not read");
+        for (const Element* e = node->FirstChildElement("instance_geometry"); e != nullptr;
+             e = e->NextSiblingElement("instance_geometry"))
+          add_geometry(geometry(*e), here);
+        waiting.emplace_back(node, here);
+      }
     }
   }
   [[nodiscard]] std::vector<Vector3> positions(const Element& mesh, std::string_view id) const {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <memory>
 
 #include "core/geometry/math.hpp"
 #include "platform/sitl/world/file_bytes.hpp"
@@ -29,11 +30,12 @@ class SdfReader {
   SdfReader(const std::string& path, double scale, SdfWorld& out) : path_(path), scale_(scale), out_(out) {}
 
   void read(std::span<const unsigned char> bytes) {
-    const Xml xml(bytes, path_, "sdf");
+    const auto document = std::make_shared<const Xml>(bytes, path_, "sdf");
+    const Xml& xml = *document;
     const Element* world = xml.root().FirstChildElement("world");
     if (world == nullptr) {
       if (xml.root().FirstChildElement("model") == nullptr) xml.refuse(xml.root(), "must have a <world>");
-      add_models(xml, xml.root(), {}, {}, 0);
+      add_all({document, &xml.root(), {}, 0}, {});
       return;
     }
     if (const Element* second = world->NextSiblingElement("world"))
@@ -47,10 +49,18 @@ class SdfReader {
            m = m->NextSiblingElement("model"))
         if (m->Attribute("name") != nullptr && m->FirstChildElement("pose") != nullptr)
           state.emplace(m->Attribute("name"), pose_of(xml, *m));
-    add_models(xml, *world, {}, state, 0);
+    add_all({document, world, {}, 0}, state);
   }
 
  private:
+  /// Something that holds models, and where it is.
+  struct Holder {
+    std::shared_ptr<const Xml> xml;
+    const Element* of;
+    Pose X_W;
+    int depth;
+  };
+
   [[nodiscard]] Pose pose_of(const Xml& xml, const Element& of) const {
     const Element* element = of.FirstChildElement("pose");
     Pose pose;
@@ -70,56 +80,66 @@ class SdfReader {
     return pose;
   }
 
-  void add_models(const Xml& xml, const Element& of, const Pose& X_W,
-                  const std::map<std::string, Pose>& state, int depth) {
-    for (const Element* model = of.FirstChildElement("model"); model != nullptr;
-         model = model->NextSiblingElement("model")) {
-      const char* name = model->Attribute("name");
-      const auto saved = name == nullptr ? state.end() : state.find(name);
-      add_model(xml, *model, X_W * (saved == state.end() ? pose_of(xml, *model) : saved->second), depth);
+  void add_all(const Holder& world, const std::map<std::string, Pose>& state) {
+    waiting_.push_back(world);
+    while (!waiting_.empty()) {
+      const Holder holder = waiting_.back();
+      waiting_.pop_back();
+      // A saved state is that of the world's own models.
+      static const std::map<std::string, Pose> kNone;
+      const auto& saved = holder.depth == 0 ? state : kNone;
+      const Xml& xml = *holder.xml;
+      for (const Element* model = holder.of->FirstChildElement("model"); model != nullptr;
+           model = model->NextSiblingElement("model")) {
+        const char* name = model->Attribute("name");
+        const auto found = name == nullptr ? saved.end() : saved.find(name);
+        const Pose X_M = found == saved.end() ? pose_of(xml, *model) : found->second;
+        add_model({holder.xml, model, holder.X_W * X_M, holder.depth + 1});
+      }
+      for (const Element* include = holder.of->FirstChildElement("include"); include != nullptr;
+           include = include->NextSiblingElement("include"))
+        add_include(holder, *include, saved);
     }
-    for (const Element* include = of.FirstChildElement("include"); include != nullptr;
-         include = include->NextSiblingElement("include"))
-      add_include(xml, *include, X_W, state, depth);
   }
 
-  void add_model(const Xml& xml, const Element& model, const Pose& X_WM, int depth) {
-    if (depth > kDeepest) xml.refuse(model, fmt::format("more than {} models in each other", kDeepest));
-    for (const Element* link = model.FirstChildElement("link"); link != nullptr;
+  void add_model(const Holder& model) {
+    const Xml& xml = *model.xml;
+    if (model.depth > kDeepest)
+      xml.refuse(*model.of, fmt::format("more than {} models in each other", kDeepest));
+    for (const Element* link = model.of->FirstChildElement("link"); link != nullptr;
          link = link->NextSiblingElement("link")) {
-      const Pose X_WL = X_WM * pose_of(xml, *link);
+      const Pose X_WL = model.X_W * pose_of(xml, *link);
       for (const Element* c = link->FirstChildElement("collision"); c != nullptr;
            c = c->NextSiblingElement("collision"))
         add_geometry(xml, xml.need(*c, "geometry"), X_WL * pose_of(xml, *c));
     }
-    add_models(xml, model, X_WM, {}, depth + 1);
+    waiting_.push_back(model);
   }
 
-  void add_include(const Xml& xml, const Element& include, const Pose& X_W,
-                   const std::map<std::string, Pose>& state, int depth) {
+  void add_include(const Holder& holder, const Element& include, const std::map<std::string, Pose>& state) {
+    const Xml& xml = *holder.xml;
     const Element& uri = xml.need(include, "uri");
     const std::string name(Xml::text(uri));
     // The two models that nearly every world includes, and that come with Gazebo.
     if (name == "model://sun") return;
     const Element* own_name = include.FirstChildElement("name");
     const auto saved = own_name == nullptr ? state.end() : state.find(std::string(Xml::text(*own_name)));
-    Pose X_WM = X_W * (saved == state.end() ? pose_of(xml, include) : saved->second);
+    Pose X_WM = holder.X_W * (saved == state.end() ? pose_of(xml, include) : saved->second);
     if (name == "model://ground_plane") {
       add_plane(xml, include, {1.0, 1.0, 0.0}, Vector3::UnitZ(), X_WM);
       return;
     }
-    if (++includes_ > kMostIncludes || depth > kDeepest)
-      xml.refuse(include, fmt::format("more than {} included models, or more than {} in each other",
-                                      kMostIncludes, kDeepest));
+    if (++includes_ > kMostIncludes)
+      xml.refuse(include, fmt::format("more than {} included models", kMostIncludes));
     std::string file = found(xml, uri, name);
     if (fs::is_directory(file)) file += "/model.sdf";
     const auto bytes = read_bytes(file, kMostBytes, "the model.sdf of an included model");
-    const Xml model(bytes, file, "sdf");
-    const Element& root = model.need(model.root(), "model");
+    const auto document = std::make_shared<const Xml>(bytes, file, "sdf");
+    const Element& root = document->need(document->root(), "model");
     // An include's own pose goes for that of the model.
     const bool placed = include.FirstChildElement("pose") != nullptr || saved != state.end();
-    if (!placed) X_WM = X_WM * pose_of(model, root);
-    add_model(model, root, X_WM, depth + 1);
+    if (!placed) X_WM = X_WM * pose_of(*document, root);
+    add_model({document, &root, X_WM, holder.depth + 1});
   }
 
   /// A file or folder of the disk for "model://NAME/...", "file://..." or a path.
@@ -242,6 +262,7 @@ class SdfReader {
   double scale_;
   SdfWorld& out_;
   std::map<std::string, std::vector<Triangle>> meshes_;
+  std::vector<Holder> waiting_;
   int includes_{0};
 };
 

@@ -91,38 +91,48 @@ TriangleMesh::TriangleMesh(std::vector<Triangle> triangles) {
   std::vector<std::uint32_t> order(triangles.size());
   std::iota(order.begin(), order.end(), 0U);
   node_.reserve(triangles.size());
-  split(0, static_cast<std::uint32_t>(order.size()), order, triangles);
+  build(order, triangles);
   triangles_.reserve(order.size());
   for (const std::uint32_t i : order) triangles_.push_back(triangles[i]);
 }
 
-void TriangleMesh::split(std::uint32_t first, std::uint32_t count, std::vector<std::uint32_t>& order,
-                         const std::vector<Triangle>& all) {
+void TriangleMesh::build(std::vector<std::uint32_t>& order, const std::vector<Triangle>& all) {
   const auto middle_of = [&all](std::uint32_t i, int axis) {
     return all[i][0][axis] + all[i][1][axis] + all[i][2][axis];
   };
-  Aabb box = box_of(all[order[first]]);
-  for (std::uint32_t i = first + 1; i < first + count; ++i) {
-    const Aabb next = box_of(all[order[i]]);
-    box = {box.min_W.cwiseMin(next.min_W), box.max_W.cwiseMax(next.max_W)};
+  struct Part {
+    std::uint32_t first, count;
+    std::uint32_t parent;  // whose second child it is
+  };
+  constexpr std::uint32_t kNobody = ~0U;
+  std::vector<Part> waiting{{0, static_cast<std::uint32_t>(order.size()), kNobody}};
+  while (!waiting.empty()) {
+    const auto [first, count, parent] = waiting.back();
+    waiting.pop_back();
+    const auto self = static_cast<std::uint32_t>(node_.size());
+    if (parent != kNobody) node_[parent].first = self;
+    Aabb box = box_of(all[order[first]]);
+    for (std::uint32_t i = first + 1; i < first + count; ++i) {
+      const Aabb next = box_of(all[order[i]]);
+      box = {box.min_W.cwiseMin(next.min_W), box.max_W.cwiseMax(next.max_W)};
+    }
+    node_.push_back({box, first, count});
+    if (count <= kLeaf) continue;
+    node_[self].count = 0;
+    int axis = 0;
+    (void)box.size().maxCoeff(&axis);
+    const std::uint32_t half = count / 2;
+    // Ties by number: the same tree on every machine.
+    std::nth_element(order.begin() + first, order.begin() + first + half, order.begin() + first + count,
+                     [&](std::uint32_t x, std::uint32_t y) {
+                       const double mx = middle_of(x, axis);
+                       const double my = middle_of(y, axis);
+                       return mx < my || (mx == my && x < y);
+                     });
+    // The first child is the next node: it is on top.
+    waiting.push_back({first + half, count - half, self});
+    waiting.push_back({first, half, kNobody});
   }
-  const std::size_t self = node_.size();
-  node_.push_back({box, first, count});
-  if (count <= kLeaf) return;
-  int axis = 0;
-  (void)box.size().maxCoeff(&axis);
-  const std::uint32_t half = count / 2;
-  // Ties by number: the same tree on every machine.
-  std::nth_element(order.begin() + first, order.begin() + first + half, order.begin() + first + count,
-                   [&](std::uint32_t a, std::uint32_t b) {
-                     const double ma = middle_of(a, axis);
-                     const double mb = middle_of(b, axis);
-                     return ma < mb || (ma == mb && a < b);
-                   });
-  split(first, half, order, all);
-  node_[self].first = static_cast<std::uint32_t>(node_.size());
-  node_[self].count = 0;
-  split(first + half, count - half, order, all);
 }
 
 double TriangleMesh::hit_distance_m(const Vector3& origin_W, const Vector3& direction_W,

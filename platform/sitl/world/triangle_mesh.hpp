@@ -38,8 +38,7 @@ class TriangleMesh {
     std::uint32_t first{};   ///< Leaf: its first triangle. Inner node: its second child.
     std::uint32_t count{0};  ///< Leaf: how many triangles.
   };
-  void split(std::uint32_t first, std::uint32_t count, std::vector<std::uint32_t>& order,
-             const std::vector<Triangle>& all);
+  void build(std::vector<std::uint32_t>& order, const std::vector<Triangle>& all);
 
   std::vector<Triangle> triangles_;  ///< In the order of the leaves.
   std::vector<Node> node_;

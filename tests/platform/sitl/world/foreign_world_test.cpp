@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <string>
 #include <vector>
@@ -153,6 +154,39 @@ TEST_F(ForeignWorld, SdfMeshesAreReadBesideTheFile) {
   EXPECT_EQ(world.mesh().triangles().size(), 12U);
   EXPECT_NEAR(world.hit_distance_m({0, 0.3, 2.1}, Vector3::UnitX(), 50.0), 9.0, 1e-9);
   EXPECT_NEAR(world.clearance_m({10, 3.0, 2}, 3.0), 1.0, 1e-9);
+}
+
+TEST_F(ForeignWorld, SdfIncludesModelsThatAreThereAndNoneInThemselves) {
+  std::filesystem::create_directories(test::scratch_folder() / "models" / "post");
+  (void)test::scratch_file("models/post/model.sdf",
+                           "<sdf version='1.6'><model name='post'><pose>0 0 1 0 0 0</pose><link name='l'>" +
+                               collision("<cylinder><radius>0.2</radius><length>2</length></cylinder>") +
+                               "</link></model></sdf>");
+  const std::string ground =
+      "<include><uri>model://ground_plane</uri></include><include><uri>model://sun</uri></include>";
+  const auto at = [](const std::string& pose) {
+    return "<include><uri>model://post</uri>" + (pose.empty() ? "" : "<pose>" + pose + "</pose>") +
+           "</include>";
+  };
+  const World world =
+      load("included.world",
+           "<sdf version='1.6'><world name='w'>" + ground + at("") + at("4 2 1.5 0 0 0") + "</world></sdf>",
+           ends({-5, -5, 2}, {-5, 5, 2}));
+  ASSERT_EQ(world.pillars().size(), 2U);
+  EXPECT_NEAR(world.pillars()[0].top_m, 2.0, 1e-9) << "the model's own pose";
+  EXPECT_NEAR(world.pillars()[1].top_m, 2.5, 1e-9) << "that of the include goes for it";
+  EXPECT_NEAR(world.pillars()[1].x_m, 4.0, 1e-9);
+
+  std::filesystem::create_directories(test::scratch_folder() / "models" / "loop");
+  (void)test::scratch_file("models/loop/model.sdf",
+                           "<sdf version='1.6'><model name='loop'><include><uri>model://loop</uri></include>"
+                           "<include><uri>model://loop</uri></include></model></sdf>");
+  EXPECT_NE(complaint("loop.world",
+                      "<sdf version='1.6'><world name='w'>" + ground +
+                          "<include><uri>model://loop</uri></include></world></sdf>",
+                      ends({-5, -5, 2}, {-5, 5, 2}))
+                .find("more than"),
+            std::string::npos);
 }
 
 TEST_F(ForeignWorld, MeshesOfAllKindsAreTheSameCube) {
