@@ -9,6 +9,7 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -260,19 +261,23 @@ int monitor(const std::string& interface, bool json, double duration_s) {
   return 0;
 }
 
-/// Bench only: one throttle on all ESCs for a while, through the same node and gate that fly; zeros before
-/// and after.
-int send_esc(const std::string& interface, bool props_off, int count, double throttle_ratio,
-             double duration_s) {
+/// Bench only: one throttle on one ESC, or on all of them, for a while, through the same node and gate that
+/// fly; zeros before and after, and on the others. `motor`: nothing for all.
+int send_esc(const std::string& interface, bool props_off, int count, std::optional<int> motor,
+             double throttle_ratio, double duration_s) {
   if (!props_off)
     throw InputError("send-esc turns motors: take the propellers off and say so with --props-off");
+  if (motor && *motor >= count)
+    throw InputError(
+        fmt::format("--motor: {} is none of {} ESCs: must be 0 .. {}", *motor, count, count - 1));
   can::SocketCan bus;
   open_or_refuse(bus, interface);
   const auto esc_count = static_cast<std::uint8_t>(count);
   firmware_if::TransmitGate gate({.esc_count = esc_count}, bus);
   std::vector<dc::Reassembler::Session> sessions(32);
   dc::Node node({.node_id = 10, .esc_count = esc_count}, gate, bus, sessions);
-  const std::vector<double> thrust(static_cast<std::size_t>(count), throttle_ratio);
+  std::vector<double> thrust(static_cast<std::size_t>(count), motor ? 0.0 : throttle_ratio);
+  if (motor) thrust.at(static_cast<std::size_t>(*motor)) = throttle_ratio;
   const auto run_for = [&](double s) {
     for (const MonotonicTime end = now() + from_seconds(s); now() < end;) {
       const MonotonicTime t = now();
@@ -307,6 +312,8 @@ struct CanOptions {
   double seconds{1e9};
   bool props_off{false};
   int esc_count{4};
+  int motor{-1};
+  bool all_motors{false};
   double throttle_ratio{0.05};
 };
 
@@ -324,9 +331,13 @@ void add_bus_commands(CLI::App& can_app, const std::shared_ptr<CanOptions>& opti
 
   CLI::App* esc_app = can_app.add_subcommand(
       "send-esc",
-      "Bench only, without propellers: one throttle on all ESCs for a while, zeros before and after");
+      "Bench only, without propellers: one throttle on one ESC for a while, zeros before and after");
   esc_app->add_option("interface", options->interface, "can0")->required();
   esc_app->add_flag("--props-off", options->props_off, "The propellers are off");
+  CLI::Option* motor =
+      esc_app->add_option("--motor", options->motor, "Which ESC: 0 is the first; no other turns")
+          ->check(CLI::Range(0, 19));
+  esc_app->add_flag("--all", options->all_motors, "All of them at once")->excludes(motor);
   esc_app->add_option("--count", options->esc_count, "How many ESCs")
       ->check(CLI::Range(1, 20))
       ->capture_default_str();
@@ -338,8 +349,11 @@ void add_bus_commands(CLI::App& can_app, const std::shared_ptr<CanOptions>& opti
       ->check(CLI::Range(0.1, 60.0));
   esc_app->callback([options, &run] {
     run = [options] {
-      return send_esc(options->interface, options->props_off, options->esc_count, options->throttle_ratio,
-                      options->seconds);
+      if (options->motor < 0 && !options->all_motors)
+        throw InputError("send-esc: which motor is to turn: must have --motor N, or --all");
+      return send_esc(options->interface, options->props_off, options->esc_count,
+                      options->all_motors ? std::nullopt : std::optional(options->motor),
+                      options->throttle_ratio, options->seconds);
     };
   });
 }

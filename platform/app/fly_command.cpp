@@ -12,12 +12,14 @@
 
 #include "platform/app/world_arguments.hpp"
 #include "platform/board/board_profile.hpp"
+#include "platform/board/plugin_loader.hpp"
 #include "platform/evaluation/scene.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/mission.hpp"
 #include "platform/mission/settings_file.hpp"
+#include "platform/mission/work_check.hpp"
 #include "platform/report/progress_line.hpp"
 #include "platform/report/svg_plot.hpp"
 #include "platform/report/table.hpp"
@@ -62,6 +64,25 @@ board::Profile profile_of(const FlyOptions& options) {
                   backends, options.host_factor, note);
   if (!note.empty()) fmt::print(stderr, "roborun: {}\n", note);
   return profile;
+}
+
+/// Says where what a part counted of its work is worth less than the time it took (mission/work_check.hpp). False
+/// if that part is a plugin: then the flight does not count.
+bool believes(const FlyOptions& options, const report::MissionReport& flown) {
+  bool believed = true;
+  for (const report::WorkRecord& w : flown.work) {
+    if (mission::is_believable(w)) continue;
+    const std::string& part = w.stage == "planner" ? options.planner : options.map;
+    const bool plugin = board::is_plugin(part);
+    fmt::print(
+        stderr,
+        "roborun: {}, {} ({}): took {:.2f} s of this processor, the work that it counted is worth {:.2f} s: "
+        "must be at least 1/{:g} of it{}\n",
+        flown.result.design, w.stage, part, w.measured_s, w.counted_s, mission::kMostUnderstated,
+        plugin ? "; the flight does not count" : "");
+    believed = believed && !plugin;
+  }
+  return believed;
 }
 
 int fly(const FlyOptions& options) {
@@ -111,12 +132,24 @@ int fly(const FlyOptions& options) {
   config.profile_name = options.profile;
   config.flight.costs = profile.costs;
   config.flight.model = profile.model;
+  if (options.profile == "host") {
+    config.host_factor = options.host_factor;
+  } else {
+    config.host_costs = board::known_host_costs({options.map, options.planner});
+    if (!config.host_costs && board::uses_plugin({options.map, options.planner}))
+      fmt::print(
+          stderr,
+          "roborun: this machine is not measured: what the plugin counts is compared with the profile {} "
+          "alone (once roborun fly --profile host: with this machine too)\n",
+          options.profile);
+  }
   config.seed = seed;
   config.record = options.record;
   config.backends.map = options.map;
   config.backends.planner = options.planner;
   std::vector<report::MissionReport> reports;
   bool all_reached = true;
+  bool believed = true;
   for (const governor::Design design : designs) {
     config.flight.design = design;
     report::ProgressLine line;
@@ -130,6 +163,7 @@ int fly(const FlyOptions& options) {
     result.env = env;
     result.mission = options.world.empty() ? options.mission : "world_file";
     all_reached = all_reached && result.reached_goal && !result.collided;
+    believed = believes(options, reports.back()) && believed;
   }
 
   if (options.json) {
@@ -154,7 +188,7 @@ int fly(const FlyOptions& options) {
   if (!options.json && !options.plot.empty()) fmt::print("picture: {}\n", options.plot);
   if (!options.json && !options.trace.empty()) fmt::print("trace: {}\n", options.trace);
   if (!options.json && !options.record.empty()) fmt::print("recording: {}\n", options.record);
-  return all_reached ? 0 : 1;
+  return all_reached && believed ? 0 : 1;
 }
 
 }  // namespace
@@ -162,15 +196,17 @@ int fly(const FlyOptions& options) {
 void add_fly_command(CLI::App& app, std::function<int()>& run) {
   const auto options = std::make_shared<FlyOptions>();
   CLI::App* fly_app = app.add_subcommand(
-      "fly", "Fly a mission in simulation: depth images, map, planner, dynamics, all real");
+      "fly",
+      "Fly a mission in simulation: its sensors, vehicle and bus are simulated, what flies them is not");
   fly_app->footer(
       "Examples:\n"
       "  roborun fly                                   environment 14 with the aware design\n"
       "  roborun fly --design aware,static,static-fair --plot flight.svg\n"
       "  roborun fly --env 27 --seed 3 --profile host --json\n"
       "  roborun fly --world house.bt --start 1,2,1.5 --goal 9,4,1.5\n\n"
-      "Exit code: 0 every design reached the goal, 1 at least one did not (the table says why), 2 bad "
-      "input.");
+      "Exit code: 0 every design reached the goal, 1 at least one did not (the table says why), or a plugin "
+      "took "
+      "more\ntime than the work that it counts is worth, 2 bad input.");
   fly_app
       ->add_option("--env", options->env,
                    "Environment: 1 .. 27, or a name like density0.45-spread80-distance900")

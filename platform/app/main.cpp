@@ -25,6 +25,7 @@
 #include "platform/app/vehicle_command.hpp"
 #include "platform/app/world_command.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/report/build_identity.hpp"
 
 namespace {
 
@@ -47,7 +48,8 @@ int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape)
   CLI::App app{"roborun: a navigation runtime for drones that thinks as long as it can afford to"};
   app.name("roborun");
   app.require_subcommand(1);
-  app.set_version_flag("--version", "roborun 0.1.0");
+  app.set_version_flag("--version",
+                       fmt::format("roborun 0.1.0, commit {}", roborun::report::build_identity().commit));
   std::function<int()> run;
   roborun::app::add_fly_command(app, run);
   roborun::app::add_calibrate_command(app, run);

@@ -41,18 +41,20 @@ int memory(const MemoryOptions& options) {
   if (options.json) {
     nlohmann::ordered_json j = {{"bytes", total}, {"pools", nlohmann::ordered_json::array()}};
     for (const report::PoolUse& p : pools)
-      j["pools"].push_back({{"name", p.name},
-                            {"element_bytes", p.element_bytes},
-                            {"count", p.count},
-                            {"bytes", p.element_bytes * p.count},
-                            {"high_water", p.tells_use ? nlohmann::ordered_json(p.high_water) : nullptr}});
+      j["pools"].push_back(
+          {{"name", p.name},
+           {"element_bytes", p.element_bytes},
+           {"count", p.count},
+           {"bytes", p.element_bytes * p.count},
+           {"high_water",
+            options.fly_s > 0.0 && p.tells_use ? nlohmann::ordered_json(p.high_water) : nullptr}});
     fmt::print("{}\n", j.dump());
     return 0;
   }
   fmt::print("{:<24} {:>10} {:>10} {:>12} {:>12} {:>6}\n", "pool", "bytes each", "count", "bytes",
              "high water", "used");
   for (const report::PoolUse& p : pools) {
-    const bool known = p.tells_use && p.count > 0;
+    const bool known = options.fly_s > 0.0 && p.tells_use && p.count > 0;
     fmt::print("{:<24} {:>10} {:>10} {:>12} {:>12} {:>6}\n", p.name, p.element_bytes, p.count,
                p.element_bytes * p.count, known ? fmt::format("{}", p.high_water) : "-",
                known ? fmt::format("{:.0f}%",

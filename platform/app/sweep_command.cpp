@@ -16,6 +16,7 @@
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/settings_file.hpp"
+#include "platform/report/build_identity.hpp"
 #include "platform/report/evaluation_table.hpp"
 #include "platform/sitl/world/generator.hpp"
 
@@ -60,6 +61,10 @@ std::string profile_digest(const board::Profile& profile) {
     for (const double s : model.slope_s_per_m3) hash.add(s);
   }
   return fmt::format("{:016x}", hash.value());
+}
+
+std::string program_digest() {
+  return evaluation::digest_of(input::read_text("/proc/self/exe", "this program"));
 }
 
 void set_shard(const std::string& text, evaluation::SweepPlan& plan) {
@@ -118,7 +123,8 @@ evaluation::SweepPlan plan_of(const SweepOptions& options, evaluation::SweepInpu
     inputs.profile[name] = profile;
   }
   refuse_twice("--profile", names);
-  plan.build = evaluation::digest_of(input::read_text("/proc/self/exe", "this program"));
+  plan.commit = report::build_identity().commit;
+  plan.build = program_digest();
   return plan;
 }
 
@@ -153,6 +159,15 @@ int sweep(const SweepOptions& options) {
 }
 
 int merge(const SweepOptions& options) {
+  // The report is made here: it must come from the sources that flew. A commit names them if nothing was changed;
+  // then another machine's program may have flown.
+  const evaluation::SweepPlan flown = evaluation::plan_of_folder(options.merged.front());
+  const bool named = flown.commit.size() == 40;
+  if (flown.commit != report::build_identity().commit || (!named && flown.build != program_digest()))
+    throw InputError(fmt::format(
+        "{}: was flown by commit {}, program {}; this is of {}, {}: must be merged by the program that flew",
+        options.merged.front(), flown.commit.empty() ? "unknown" : flown.commit, flown.build,
+        report::build_identity().commit, program_digest()));
   evaluation::merge_shards(options.merged, options.out);
   const evaluation::SweepStore store(options.out, evaluation::plan_of_folder(options.out));
   tell(store, options);
@@ -161,11 +176,15 @@ int merge(const SweepOptions& options) {
 
 int compare(const SweepOptions& options) {
   std::vector<report::SweepRow> rows;
+  std::string sources;
   for (const std::string& folder : options.merged) {
     const evaluation::SweepStore store(folder, evaluation::plan_of_folder(folder));
+    const std::string& commit = store.plan().commit;
+    sources += fmt::format("{}: commit {}, program {}\n", folder, commit.empty() ? "unknown" : commit,
+                           store.plan().build);
     for (report::SweepRow& row : evaluation::rows_of(store)) rows.push_back(std::move(row));
   }
-  fmt::print("{}", report::kernel_table(rows));
+  fmt::print("{}\n{}", report::kernel_table(rows), sources);
   return 0;
 }
 
@@ -217,7 +236,8 @@ void add_sweep_command(CLI::App& app, std::function<int()>& run) {
       "gains\n\n"
       "The folder --out holds request.json, results.jsonl (one line a mission) and report.html (tables and\n"
       "pictures, opens offline). Stopped by Ctrl-C or power loss, the same command goes on. Results do not\n"
-      "depend on --jobs, machine or order.\n"
+      "depend on --jobs, machine or order. A folder holds the flights of one commit: another one is "
+      "refused.\n"
       "Exit code: 0 every mission was flown (whether it reached the goal is in the table), 1 stopped before "
       "that,\n2 bad input.");
   sweep_app->add_option("--suite", options->suite, "Set of environments: paper27")->capture_default_str();

@@ -14,7 +14,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json json_of(const SweepPlan& p) {
-  Json json{{"build", p.build}, {"suite", p.suite}, {"mission", p.mission}, {"environments", p.environments}};
+  Json json{{"commit", p.commit}, {"build", p.build}, {"suite", p.suite}, {"mission", p.mission}};
+  json["environments"] = p.environments;
   json["profiles"] = Json::array();
   for (const SweepPlan::ProfileId& id : p.profiles)
     json["profiles"].push_back({{"name", id.name}, {"digest", id.digest}});
@@ -72,6 +73,7 @@ SweepPlan plan_from_json(const std::string& path, const std::string& text) {
   try {
     const Json json = Json::parse(text);
     SweepPlan p;
+    p.commit = json.value("commit", "");
     p.build = json.at("build");
     p.suite = json.at("suite");
     p.mission = json.at("mission");

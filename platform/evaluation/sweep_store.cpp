@@ -29,6 +29,13 @@ std::optional<std::string> read_file(const std::string& path) {
   return std::string(std::istreambuf_iterator<char>(file), {});
 }
 
+/// What was flown with which sources, if that is what two plans differ in.
+std::string both_commits(const SweepPlan& held, const SweepPlan& wanted, const std::string& key) {
+  if (key != "commit") return {};
+  return fmt::format(" ({}; this program is of {})", held.commit.empty() ? "unknown" : held.commit,
+                     wanted.commit);
+}
+
 [[noreturn]] void cannot(const std::string& path) {
   throw InputError(fmt::format("{}: cannot be written: {}", path, strerror(errno)));
 }
@@ -78,10 +85,11 @@ SweepStore::SweepStore(std::string folder, SweepPlan plan)
   }
   try {
     if (std::filesystem::exists(path(kRequest))) {
-      const std::string key = difference(plan_of_folder(folder_), plan_);
+      const SweepPlan held = plan_of_folder(folder_);
+      const std::string key = difference(held, plan_);
       if (!key.empty()) {
-        throw InputError(
-            fmt::format("{}: holds a sweep with other {}: give another --out, or remove it", folder_, key));
+        throw InputError(fmt::format("{}: holds a sweep with other {}{}: give another --out, or remove it",
+                                     folder_, key, both_commits(held, plan_, key)));
       }
     } else if (std::filesystem::exists(path(kResults))) {
       throw InputError(fmt::format("{}: holds results without a {}: give another --out", folder_, kRequest));
@@ -161,8 +169,8 @@ void merge_shards(const std::vector<std::string>& folders, const std::string& ou
     plan.shard = plan.shards = 1;
     const std::string key = difference(plan, whole);
     if (!key.empty())
-      throw InputError(fmt::format("{}: its {} are not those of {}: shards of one sweep only", folder, key,
-                                   folders.front()));
+      throw InputError(
+          fmt::format("{}: has other {} than {}: must be shards of one sweep", folder, key, folders.front()));
   }
   SweepStore merged(out, whole);
   std::map<std::string, std::size_t> index;

@@ -57,6 +57,10 @@ struct MissionConfig {
   board::BackendNames backends{};
   board::OwnParts own{};  ///< In the place of backends and governor; such a flight is not recorded.
   sitl::SimulatorConfig simulator{};
+  /// What the stages cost on the machine that simulates, if that is known: a second price, beside flight.costs,
+  /// of the work that map and planner say they did (work_check.hpp).
+  std::optional<core::CostProfile> host_costs{};
+  double host_factor{1.0};  ///< flight.costs are so many times those of the machine that was measured.
   SlowDown slow_down{};
   JudgeConfig judge{};
   std::vector<TimedFault> faults{};  ///< At most sitl::FaultLine::kMost.

@@ -27,6 +27,22 @@ constexpr double kFarthest_m = 20e3;   // from the origin; what is farther is co
 constexpr double kOverGround_m = 0.5;  // from there on is where a vehicle may be
 constexpr double kSide_m = 5.0;        // beside a start or goal outside of what is in the file
 constexpr double kUneven_m = 0.3;      // of the ground around a start
+constexpr double kPillarTop_m = 20.0;
+constexpr std::array<WorldKey, 10> kKeys{
+    {{"world",
+      "bounds",
+      "[[x, y, z], [x, y, z]], m",
+      {},
+      "lowest and highest corner: the vehicle's centre stays inside"},
+     {"world", "start", "[x, y, z], m", {}, "top of the climb, free all around; --start says another"},
+     {"world", "goal", "[x, y, z], m", {}, "where the mission ends, hovering; --goal says another"},
+     {"pillar", "x", "m", {}, "of the axis of an upright cylinder"},
+     {"pillar", "y", "m", {}, ""},
+     {"pillar", "radius", "m, above 0", {}, ""},
+     {"pillar", "bottom", "m", 0.0, "height at which it begins"},
+     {"pillar", "top", "m, above bottom", kPillarTop_m, "height at which it ends"},
+     {"box", "min", "[x, y, z], m", {}, "lowest corner of a box along the axes"},
+     {"box", "max", "[x, y, z], m, above min", {}, "highest corner"}}};
 
 enum class Kind : std::uint8_t { kToml, kBt, kOt, kSdf, kPcd, kPly, kLas, kMesh, kUnknown };
 
@@ -67,9 +83,7 @@ Kind kind_of(const std::string& path) {
 void check_content(const std::string& path, Kind kind, const std::vector<unsigned char>& bytes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (kind == Kind::kMesh && path.ends_with(".dae")) kind = Kind::kSdf;  // XML, too: its root says which
-  const KnownKind* named = nullptr;
   for (const KnownKind& known : kKnown) {
-    if (known.kind == kind && named == nullptr) named = &known;
     if (known.kind == kind || known.magic.empty() || !text.starts_with(known.magic)) continue;
     refuse(path, fmt::format("holds {}, not {}: must have the name of what it is, {}", known.format,
                              path.substr(path.rfind('.')), known.end));
@@ -84,13 +98,13 @@ void read_pillars(const input::TomlReader& reader, const toml::table& root, Worl
   for (const toml::node& node : *list->as_array()) {
     const toml::table* table = node.as_table();
     if (table == nullptr) reader.refuse(node, "pillar", "must be written as [[pillar]]");
-    reader.allow_keys(*table, "[[pillar]]", {"x", "y", "radius", "bottom", "top"});
+    reader.allow_keys(*table, "[[pillar]]", keys_of(kKeys, "pillar"));
     Pillar pillar;
     pillar.x_m = reader.number(reader.need(*table, "x", "[[pillar]]"), "x");
     pillar.y_m = reader.number(reader.need(*table, "y", "[[pillar]]"), "y");
     pillar.radius_m = reader.number(reader.need(*table, "radius", "[[pillar]]"), "radius");
     pillar.bottom_m = reader.number_or(*table, "bottom", 0.0);
-    pillar.top_m = reader.number_or(*table, "top", 20.0);
+    pillar.top_m = reader.number_or(*table, "top", kPillarTop_m);
     if (!(pillar.radius_m > 0.0)) reader.refuse(*table, "radius", "must be above 0");
     if (!(pillar.top_m > pillar.bottom_m)) reader.refuse(*table, "top", "must be above bottom");
     world.pillars.push_back(pillar);
@@ -105,7 +119,7 @@ void read_boxes(const input::TomlReader& reader, const toml::table& root, WorldD
   for (const toml::node& node : *list->as_array()) {
     const toml::table* table = node.as_table();
     if (table == nullptr) reader.refuse(node, "box", "must be written as [[box]]");
-    reader.allow_keys(*table, "[[box]]", {"min", "max"});
+    reader.allow_keys(*table, "[[box]]", keys_of(kKeys, "box"));
     const Aabb box{reader.point(reader.need(*table, "min", "[[box]]"), "min"),
                    reader.point(reader.need(*table, "max", "[[box]]"), "max")};
     if (!(box.size().minCoeff() > 0.0)) reader.refuse(*table, "max", "must be above min on every axis");
@@ -122,7 +136,7 @@ WorldDescription read_toml(const std::string& path, const std::vector<unsigned c
   reader.allow_keys(root, "the file", {"world", "pillar", "box", "body"});
   const toml::table* table = reader.need(root, "world", "the file").as_table();
   if (table == nullptr) reader.refuse(root, "world", "must be a table: [world]");
-  reader.allow_keys(*table, "[world]", {"bounds", "start", "goal"});
+  reader.allow_keys(*table, "[world]", keys_of(kKeys, "world"));
 
   WorldDescription world;
   const toml::node& bounds = reader.need(*table, "bounds", "[world]");
@@ -353,6 +367,13 @@ void check_ends(const std::string& path, const World& world, double radius_m) {
 }
 
 }  // namespace
+
+std::vector<WorldKey> world_keys() {
+  std::vector<WorldKey> keys(kKeys.begin(), kKeys.end());
+  const std::span<const WorldKey> bodies = body_keys();
+  keys.insert(keys.end(), bodies.begin(), bodies.end());
+  return keys;
+}
 
 OctomapLeaves load_octomap(const std::string& path) {
   const bool full = is_full_octomap(path);

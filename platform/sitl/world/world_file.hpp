@@ -5,8 +5,10 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "platform/sitl/world/world.hpp"
+#include "platform/sitl/world/world_key.hpp"
 
 namespace roborun::sitl {
 
@@ -30,11 +32,8 @@ struct WorldOptions {
 /// meshes 1 GiB), of another format than its name says, damaged, unknown keys, wrong types, numbers not finite, start
 /// or goal occupied or out of bounds, no ground below the start.
 ///
-/// TOML: tables [world] with bounds = [[x, y, z], [x, y, z]], start = [x, y, z], goal = [x, y, z], and any
-/// number of
-///   [[pillar]] with x, y, radius, optional bottom (0) and top (20), and [[box]] with min = [x, y, z], max =
-///   [x, y, z]; metres, at most 100,000 objects; and [[body]], which moves
-///   (body_reader.hpp). The ground is z = 0.
+/// TOML: the keys of world_keys(), metres, at most 100,000 pillars, 100,000 boxes and 1,000 bodies. The ground is
+///   z = 0.
 /// OctoMap: every leaf that its log-odds call occupied becomes solid; the bounds are the box around all
 ///   leaves, from 0.5 m above its lowest. The ground is the lowest leaf, or z = 0 if that is lower.
 /// SDF (sdf_file.hpp): shapes stay exact; planes are the ground, and what stands under the start is.
@@ -45,6 +44,9 @@ struct WorldOptions {
 /// for given ends. Start and goal default (but for TOML) to the free-most points near the two ends of the longer
 /// side, at the middle height.
 [[nodiscard]] World load_world(const std::string& path, const WorldOptions& options);
+
+/// Every key of a TOML world: the only ones that load_world() takes.
+[[nodiscard]] std::vector<WorldKey> world_keys();
 
 /// The occupied space of an OctoMap file in memory (.ot if `full`, otherwise .bt). Iterative, at most 16
 /// levels deep, and never allocates more than the bytes justify; refuses what is truncated, too long or not

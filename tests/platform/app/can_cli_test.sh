@@ -3,7 +3,7 @@
 set -u
 roborun=$1
 data=$2
-work=$(mktemp -d)
+work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 failed=0
 check() { if ! "${@:2}"; then echo "FAILED: $1"; failed=1; fi; }

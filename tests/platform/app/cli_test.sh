@@ -66,7 +66,13 @@ refuses "subcommand" world
 refuses "X,Y,Z" fly --world "$data/worlds/two_pillars.toml" --start 1,2
 refuses "cannot be opened" fly --settings nope.toml
 refuses "--nope" fly --nope
-refuses "--props-off" can send-esc can0 --seconds 1
+refuses "--props-off" can send-esc can0 --all --seconds 1
+refuses "must have --motor N, or --all" can send-esc nope0 --props-off --seconds 1
+refuses "must be 0 .. 3" can send-esc nope0 --props-off --motor 4 --seconds 1
+refuses "--motor excludes --all" can send-esc nope0 --props-off --motor 1 --all --seconds 1
+refuses "--throttle" can send-esc nope0 --props-off --motor 1 --throttle 0.5 --seconds 1
+refuses "--seconds" can send-esc nope0 --props-off --motor 1 --seconds 100
+refuses "nope0" can send-esc nope0 --props-off --motor 1 --seconds 1
 refuses "nocan7" can monitor nocan7
 refuses "cannot be opened" can decode --candump nope.log
 refuses "required" gpio check --open x
@@ -84,6 +90,15 @@ refuses "100, 125, 160, 200, 250, 320 or 400" audit --rate -400
 refuses "--rate" audit --rate fast
 refuses "SLOT:MILLISECONDS" audit --inject-spin nope:5
 refuses "cannot be opened" audit --compare nope.json nope.json
+refuses "cannot be opened" audit --compare nope.json,nope.json nope.json
+refuses "/nope/a.html: cannot be written" audit --html /nope/a.html
+refuses "/nope/a.json: cannot be written" audit --trace /nope/a.json
+refuses "/nope/a.npy: cannot be written" audit --samples /nope/a.npy
+refuses "'nope': must be one of missing, stopped, heap_calls" audit --require nope=1
+refuses "must be NAME=LIMIT with a limit of 0 or more" audit --require misses=-1
+refuses "must be NAME=LIMIT with a limit of 0 or more" audit --require heap_calls=0,misses
+refuses "must be what toolchain/bench/run instructions" audit --instructions "$data/worlds/two_pillars.toml"
+refuses "must be 1024 MiB at most" audit --seconds 86400 --samples /tmp/roborun_cli_test.npy
 refuses "is not the JSON of an audit" audit --compare "$data/worlds/two_pillars.toml" "$data/worlds/two_pillars.toml"
 refuses "1 .. 27" memory --env 99
 refuses "cannot be opened" scenario run nope.toml
@@ -110,6 +125,15 @@ vehicle ": width: must be a whole number" 's/^width = .*/width = 96.5/'
 vehicle ": mass_kg: missing in [body]" 's/^mass_kg = .*//'
 vehicle "drak: unknown key" 's/^.drag.$/[drak]/'
 rm -f /tmp/roborun_vehicle.$$.toml
+# Every pool has a name of its own, and after a flight a high-water mark.
+pools=$("$roborun" memory --fly 20 --json)
+names=$(grep -o '"name":"[^"]*"' <<<"$pools" | sort)
+if [[ $(wc -l <<<"$names") -ge 15 && -z $(uniq -d <<<"$names") && $pools != *null* ]]; then
+  passed=$((passed + 1))
+else
+  echo "FAILED memory --fly 20 names a pool twice or has no high-water mark: $pools"
+  failed=$((failed + 1))
+fi
 # What the program says of its keys is what the documents say.
 if "$roborun" config | cmp -s - <(sed -n '/^```text$/,/^```$/p' "$(dirname "$0")/../../../platform/CONFIG.md" | sed '1d;$d'); then
   passed=$((passed + 1))
@@ -130,6 +154,34 @@ if [[ $(id -u) -eq 0 && $(head -c 2 "$roborun" | tr -d '\0') != '#!' ]] && comma
   rm -rf "$copy" /tmp/roborun_cli_test
   roborun=$real
 fi
+# The verdict decides the exit code: deadline misses, what is missing and what a short run cannot show are no pass, unless taken
+# back by name. Runs of other environments are not compared.
+judges() {
+  local wanted=$1 text=$2 out code
+  shift 2
+  out=$("$roborun" audit --best-effort --profile paper "$@" 2>/dev/null)
+  code=$?
+  if [[ $code -ne $wanted || "$out" != *"$text"* ]]; then
+    echo "FAILED [$code] roborun audit $*: '${out:0:300}' does not say '$text' with exit code $wanted"
+    failed=$((failed + 1))
+  else
+    passed=$((passed + 1))
+  fi
+}
+none=missing=none,stopped=none,heap_calls=none,decisions_late=none,decision_stalls=none,events_lost=none,misses=none,slips=none
+none=$none,overruns=none,minor_faults=none,major_faults=none,jitter_p999_us=none
+judges 1 "FAIL flight.misses: " --seconds 2 --inject-spin track:3
+judges 1 '"verdict":"fail"' --seconds 1 --json
+judges 1 "FAIL flight.jitter_p999_us: not shown" --seconds 1
+judges 0 '"verdict":"pass"' --seconds 1 --json --require "$none"
+judges 0 "PASS" --seconds 1 --require "$none"
+for env in 14 3; do
+  "$roborun" audit --seconds 1 --best-effort --profile paper --env $env --json >/tmp/roborun_audit$env.$$ 2>/dev/null
+done
+refuses 'environment: "14 ' audit --compare /tmp/roborun_audit14.$$ /tmp/roborun_audit3.$$
+head -c 1000000 /dev/zero | tr '\0' '[' >/tmp/roborun_audit3.$$
+refuses "is not the JSON of an audit" audit --compare /tmp/roborun_audit14.$$ /tmp/roborun_audit3.$$
+rm -f /tmp/roborun_audit14.$$ /tmp/roborun_audit3.$$
 printf '[world]\nbounds = [[0,0,0],[9,9,9]]\nstart = [1,1,1]\ngoal = [5,5,5]\nwalls = 3\n' >/tmp/roborun_bad.$$.toml
 refuses ":5: walls: unknown key" fly --world /tmp/roborun_bad.$$.toml
 printf '[camera]\npixels = 9999\n' >/tmp/roborun_bad.$$.toml
