@@ -12,6 +12,7 @@
 
 #include "platform/app/exit_code.hpp"
 #include "platform/app/options.hpp"
+#include "platform/app/world_arguments.hpp"
 #include "platform/board/board_profile.hpp"
 #include "platform/board/plugin_loader.hpp"
 #include "platform/evaluation/scene.hpp"
@@ -42,8 +43,7 @@ struct FlyOptions {
   std::string map{"own"};
   std::string planner{"own"};
   std::string world;
-  std::string start;
-  std::string goal;
+  WorldArguments in_file;
   std::string vehicle{"paper"};
   std::string settings;
   std::string host_file;
@@ -54,17 +54,6 @@ struct FlyOptions {
   std::string colour{"speed"};
   bool json{false};
 };
-
-std::optional<Vector3> point_of(const char* option, const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  std::vector<double> p;
-  for (const std::string& part : input::split(text)) {
-    if (const auto value = input::number(part)) p.push_back(*value);
-  }
-  if (p.size() != 3 || input::split(text).size() != 3)
-    throw InputError(fmt::format("{}: '{}' is not a point: must be X,Y,Z in metres", option, text));
-  return Vector3(p[0], p[1], p[2]);
-}
 
 std::string host_file_of(const FlyOptions& options) {
   return options.host_file.empty() ? board::default_host_path({options.map, options.planner})
@@ -126,18 +115,18 @@ int fly(const FlyOptions& options) {
   input::check_outputs({{"--record", options.record}, {"--trace", options.trace}, {"--plot", options.plot}},
                        inputs);
   if (!options.settings.empty()) mission::load_settings(options.settings, config);
-  const sitl::Endpoints endpoints{point_of("--start", options.start), point_of("--goal", options.goal)};
   std::string env;
   std::string title;
   double zone_m = 0.0;
   std::unique_ptr<sitl::World> world;
   if (!options.world.empty()) {
-    world = std::make_unique<sitl::World>(sitl::load_world(options.world, endpoints));
+    world = std::make_unique<sitl::World>(
+        sitl::load_world(options.world, world_options(options.in_file, config.flight.vehicle.radius_m)));
     env = options.world;
     title = fmt::format("{}, seed {}", options.world, seed);
   } else {
-    if (endpoints.start_W || endpoints.goal_W)
-      throw InputError("--start and --goal go with --world FILE: the environments have their own");
+    if (any_given(options.in_file))
+      throw InputError("--start, --goal and the like go with --world FILE: the environments have their own");
     const sitl::NamedEnvironment named = sitl::environment(options.env);
     world = std::make_unique<sitl::World>(sitl::generate(named.knobs, mission, seed));
     env = fmt::format("{}", named.number);
@@ -262,11 +251,12 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
                    "own, ompl:NAME with any of OMPL's geometric planners, such as ompl:RRTstar, or "
                    "plugin:FILE.so (see platform/board/plugin.hpp)")
       ->capture_default_str();
-  fly_app->add_option("--world", options->world, "World from a file instead: .toml, or OctoMap .bt / .ot")
+  fly_app->add_option("--world", options->world,
+                      "World from a file instead: .toml, OctoMap .bt / .ot, SDF .world / .sdf, points .pcd / .ply "
+                      "/ .las, meshes .stl / .obj / .dae")
       ->excludes(env)
       ->excludes(mission);
-  fly_app->add_option("--start", options->start, "With --world: X,Y,Z in metres");
-  fly_app->add_option("--goal", options->goal, "With --world: X,Y,Z in metres");
+  add_world_arguments(*fly_app, options->in_file);
   fly_app
       ->add_option("--vehicle", options->vehicle,
                    "Vehicle: a shipped one (roborun vehicle list), or a vehicle file")

@@ -32,6 +32,7 @@
 #include "platform/app/solve_command.hpp"
 #include "platform/app/sweep_command.hpp"
 #include "platform/app/vehicle_command.hpp"
+#include "platform/app/world_command.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/stop_signal.hpp"
 #include "platform/report/build_identity.hpp"
@@ -92,6 +93,7 @@ int run_command(int argc, char** argv) {
   cli::add_replay_command(app, run);
   cli::add_vehicle_command(app, run);
   cli::add_config_command(app, run);
+  cli::add_world_command(app, run);
   try {
     app.parse(argc, argv);
     cli::refuse_before_subcommand(app);

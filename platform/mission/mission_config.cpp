@@ -73,7 +73,10 @@ void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle) {
   }
 }
 
-Vector3 ground_below(const sitl::World& world) { return {world.start_W().x(), world.start_W().y(), 0.0}; }
+Vector3 ground_below(const sitl::World& world) {
+  const Vector3& start_W = world.start_W();
+  return {start_W.x(), start_W.y(), world.ground_below_m(start_W)};
+}
 
 board::ImageLimits image_limits(const MissionConfig& config) {
   return board::image_limits(sitl::rig_of(config.simulator), config.flight.vehicle);

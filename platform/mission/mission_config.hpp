@@ -75,7 +75,7 @@ struct MissionConfig {
 [[nodiscard]] flight::FlightConfig flight_config_of(const sitl::World& world, const MissionConfig& config);
 /// This vehicle flies the mission.
 void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle);
-/// Where the vehicle stands before the flight.
+/// Where the vehicle stands before the flight: on the first surface below the start.
 [[nodiscard]] Vector3 ground_below(const sitl::World& world);
 /// Of the images that the map will get.
 [[nodiscard]] board::ImageLimits image_limits(const MissionConfig& config);

@@ -49,6 +49,20 @@ refuses "deadline or all" fly --plot x.svg --color red
 refuses "package_delivery or search_and_rescue" fly --mission x
 refuses "cannot be opened" fly --world nope.toml
 refuses "must end in .toml, .bt or .ot" fly --world nope.xyz
+refuses "cannot be opened" world check nope.sdf
+refuses "must be from 0 to 2" world check "$data/worlds/two_pillars.toml" --margin -1
+refuses "must be from 0.01 to 5" world check "$data/worlds/two_pillars.toml" --resolution 1e-9
+refuses "cannot be written" world check "$data/worlds/two_pillars.toml" --plot /nonexistent/x.svg
+refuses "outside the bounds" world check "$data/worlds/two_pillars.toml" --start 900,0,3
+refuses "must be X,Y,Z,X,Y,Z" world check "$data/worlds/two_pillars.toml" --bounds 1,2,3
+refuses "goes with point clouds" world check "$data/worlds/two_pillars.toml" --cell 0.1
+refuses "does not go with .toml" fly --world "$data/worlds/two_pillars.toml" --scale 2
+refuses "go with --world" fly --cell 0.1
+refuses "must be forest, maze" world make jungle
+refuses "must be from 0.4 to 20" world make maze --width 0
+refuses "does not go with forest" world make forest --width 3
+refuses "whole number" world make forest --seed x
+refuses "subcommand" world
 refuses "X,Y,Z" fly --world "$data/worlds/two_pillars.toml" --start 1,2
 refuses "cannot be opened" fly --settings nope.toml
 refuses "--nope" fly --nope
