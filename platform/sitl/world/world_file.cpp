@@ -45,7 +45,7 @@ constexpr std::array<WorldKey, 10> kKeys{
      {"box", "min", "[x, y, z], m", {}, "lowest corner of a box along the axes"},
      {"box", "max", "[x, y, z], m, above min", {}, "highest corner"}}};
 
-enum class Kind : std::uint8_t { kToml, kBt, kOt, kSdf, kPcd, kPly, kLas, kMesh, kUnknown };
+enum class Kind : std::uint8_t { kToml, kBt, kOt, kSdf, kPcd, kPly, kLas, kMesh };
 
 /// Ends of names, what they hold, and how such a file begins; empty: in no special way.
 struct KnownKind {
