@@ -1,10 +1,15 @@
 #include "platform/report/instruction_counts.hpp"
 
+#include <fmt/format.h>
+
 #include <stdexcept>
 
 #include "platform/input/json_reader.hpp"
 
 namespace roborun::report {
+namespace {
+constexpr const char* kWanted = "must be what toolchain/bench/run instructions --update writes";
+}  // namespace
 
 InstructionCounts instruction_counts(const std::string& json) {
   InstructionCounts counts;
@@ -14,9 +19,9 @@ InstructionCounts instruction_counts(const std::string& json) {
     for (const auto& [slot, figures] : all.at("slots").items())
       counts.worst[slot] = figures.at("worst").get<std::uint64_t>();
   } catch (const InputError& error) {
-    throw std::invalid_argument(error.what());
+    throw std::invalid_argument(fmt::format("{}: {}", error.what(), kWanted));
   } catch (const nlohmann::json::exception&) {
-    throw std::invalid_argument("must be what toolchain/bench/run instructions --update writes");
+    throw std::invalid_argument(kWanted);
   }
   return counts;
 }
