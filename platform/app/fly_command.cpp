@@ -251,9 +251,11 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
                    "own, ompl:NAME with any of OMPL's geometric planners, such as ompl:RRTstar, or "
                    "plugin:FILE.so (see platform/board/plugin.hpp)")
       ->capture_default_str();
-  fly_app->add_option("--world", options->world,
-                      "World from a file instead: .toml, OctoMap .bt / .ot, SDF .world / .sdf, points .pcd / .ply "
-                      "/ .las, meshes .stl / .obj / .dae")
+  fly_app
+      ->add_option(
+          "--world", options->world,
+          "World from a file instead: .toml, OctoMap .bt / .ot, SDF .world / .sdf, points .pcd / .ply "
+          "/ .las, meshes .stl / .obj / .dae")
       ->excludes(env)
       ->excludes(mission);
   add_world_arguments(*fly_app, options->in_file);
