@@ -13,6 +13,7 @@
 #include "core/geometry/vector.hpp"
 #include "core/memory/static_vector.hpp"
 #include "core/range.hpp"
+#include "core/sensor_model.hpp"
 #include "firmware_if/depth_camera.hpp"
 
 namespace roborun {
@@ -25,6 +26,8 @@ struct SensorMount {
 };
 [[nodiscard]] firmware_if::CameraMount camera_mount(const SensorMount& mount) noexcept;
 
+inline constexpr double kMostInvalid = 0.6;
+
 /// A depth camera. Defaults: one of the six of the paper's vehicle (FACTS: range 25 m).
 struct CameraSpec {
   std::uint16_t width{96};  ///< Pixels.
@@ -36,6 +39,10 @@ struct CameraSpec {
   double rate_Hz{20.0};
   double latency_s{0.030};  ///< Exposure, transfer and depth computation.
   SensorMount mount{};
+  CameraModel model{};
+  /// [0, kMostInvalid]. Share of pixels without a value on surfaces that it could measure, in patches; not of `clean`. Assumed: real
+  /// ones have 5 to 30 % by texture, sun and reflection.
+  double invalid_ratio{0.1};
 };
 
 /// A LiDAR that turns, or one with a pattern of its own. Defaults: 16 rings of 2 degrees.
@@ -49,6 +56,7 @@ struct LidarSpec {
   double rate_Hz{10.0};
   double latency_s{0.020};
   SensorMount mount{};
+  LidarModel model{};
 };
 
 inline constexpr std::size_t kMostCameras = 8;
@@ -57,6 +65,8 @@ inline constexpr std::size_t kMostLidars = 2;
 struct SensorRig {
   core::StaticVector<CameraSpec, kMostCameras> cameras{};
   core::StaticVector<LidarSpec, kMostLidars> lidars{};
+  ImuModel imu{};
+  GnssModel gnss{};
 };
 
 /// One number of a sensor in a file.

@@ -66,13 +66,23 @@ void LaneExecutive::begin_frame() noexcept {
     if (degrade_next_[i]) now_[i].budget /= 2;
   }
   charged_ = kFrameTable[first_].id;
-  mark_ = woke_;
+  mark_ = piece_ = woke_;
+}
+
+void LaneExecutive::settle(MonotonicTime now, bool ends) noexcept {
+  Present& present = now_[index(charged_)];
+  present.spent += now - mark_;
+  mark_ = now;
+  if (!ends) return;
+  if (trace_ != nullptr && present.ran)
+    trace_->push({release_, piece_, now, static_cast<std::uint32_t>(lane_.frames), id_, charged_, false,
+                  present.spent > present.budget});
+  piece_ = now;
 }
 
 void LaneExecutive::charge_to(SlotId id) noexcept {
   const MonotonicTime now = clock_.now();
-  now_[index(charged_)].spent += now - mark_;
-  mark_ = now;
+  settle(now, id != charged_);
   charged_ = id;
   Present& present = now_[index(id)];
   if (!present.ran) present.begin = now;
@@ -124,7 +134,6 @@ void LaneExecutive::judge(const SlotSpec& spec, const Present& present) noexcept
     s.budget = present.budget;
   }
   const bool overrun = present.spent > present.budget;
-  if (trace_ != nullptr) trace_->push({spec.id, lane_.frames, present.begin, present.spent, overrun});
   degrade_next_[i] = false;
   if (!overrun) {
     if (spec.on_overrun == OverrunPolicy::kBrake && in_a_row_[i] >= spec.overruns_to_act)
@@ -153,8 +162,7 @@ void LaneExecutive::judge(const SlotSpec& spec, const Present& present) noexcept
 }
 
 void LaneExecutive::finish_frame() noexcept {
-  const MonotonicTime done = clock_.now();
-  now_[index(charged_)].spent += done - mark_;
+  settle(clock_.now(), true);
   Nanos of_stages{0};
   for (std::size_t i = 0; i < count_; ++i) {
     if (!now_[i].ran) continue;
@@ -163,10 +171,13 @@ void LaneExecutive::finish_frame() noexcept {
     if (spec.is_stage) of_stages += now_[i].spent;
   }
   in_frame_ = false;
-  ++lane_.frames;
 
   const MonotonicTime due = release_ + period_;
   const MonotonicTime end = clock_.now();
+  if (trace_ != nullptr)
+    trace_->push(
+        {release_, woke_, end, static_cast<std::uint32_t>(lane_.frames), id_, charged_, true, end > due});
+  ++lane_.frames;
   if (end > due) ++lane_.deadline_misses;
   lane_.response.add(end - release_);
   lane_.overhead.add((end - woke_) - of_stages);

@@ -39,15 +39,19 @@ class Reactions {
   std::atomic<std::uint32_t> stop_{0};
 };
 
-/// One slot of one frame, for traces.
-struct SlotEvent {
-  SlotId slot{};
-  std::uint64_t frame{};
-  MonotonicTime begin{};
-  Nanos spent{};
-  bool overrun{};
+/// A frame, from the wake-up to its end, or a piece of it that was charged to one slot. Pieces of a lane follow
+/// each other and lie within their frame, which comes after them.
+struct TraceEvent {
+  MonotonicTime release{};  ///< Of the frame.
+  MonotonicTime begin{}, end{};
+  std::uint32_t frame{};  ///< Counted from the lane's first one, modulo 2^32.
+  LaneId lane{};
+  SlotId slot{};  ///< Of a piece.
+  bool is_frame{};
+  bool
+      overrun{};  ///< Piece: its slot had spent more than its budget by then. Frame: it ended after its deadline.
 };
-using TraceRing = SpscRing<SlotEvent, 8192>;
+using TraceRing = SpscRing<TraceEvent, 8192>;
 
 /// Time is charged to the slot that uses it, by wall clock, preemption included. Releases lie on a grid that
 /// never shifts: a frame that runs into its successors makes them slip, they are counted and never made up
@@ -118,6 +122,8 @@ class LaneExecutive {
   void begin_frame() noexcept;
   void finish_frame() noexcept;
   void judge(const SlotSpec& spec, const Present& present) noexcept;
+  /// What passed until `now` is the charged slot's; `ends`: its piece of the trace ends with it.
+  void settle(MonotonicTime now, bool ends) noexcept;
   /// Tells overdue() that `slot` is to be done by `due`.
   void expect(SlotId slot, MonotonicTime due) noexcept;
 
@@ -140,7 +146,8 @@ class LaneExecutive {
   bool awake_{false};
   bool ending_{false};
   SlotId charged_{};
-  MonotonicTime mark_{};  ///< Since when time is `charged_`'s.
+  MonotonicTime mark_{};   ///< Since when time is `charged_`'s.
+  MonotonicTime piece_{};  ///< Since when it is without a break.
   std::array<Present, kMostSlots> now_{};
   std::array<std::uint32_t, kMostSlots> in_a_row_{};
   std::array<bool, kMostSlots> skip_next_{};

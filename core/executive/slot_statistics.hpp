@@ -23,11 +23,14 @@ class DurationHistogram {
   /// never beyond max(). 0 if empty; `ratio` is clamped to [0, 1], NaN reads as 1.
   [[nodiscard]] Nanos quantile(double ratio) const noexcept;
 
- private:
   static constexpr std::size_t kSub = 64;
   static constexpr std::size_t kBuckets = kSub * 35;
-  [[nodiscard]] static std::size_t bucket_of(std::uint64_t ns) noexcept;
+  /// How many durations lie in a bucket, and the longest that lies in it. Precondition: bucket < kBuckets.
+  [[nodiscard]] std::uint32_t in_bucket(std::size_t bucket) const noexcept { return bucket_[bucket]; }
   [[nodiscard]] static std::uint64_t upper_end_ns(std::size_t bucket) noexcept;
+
+ private:
+  [[nodiscard]] static std::size_t bucket_of(std::uint64_t ns) noexcept;
 
   std::array<std::uint32_t, kBuckets> bucket_{};
   std::uint64_t count_{0};

@@ -8,9 +8,12 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "platform/app/exit_code.hpp"
+#include "platform/app/options.hpp"
 #include "platform/board/board_profile.hpp"
 #include "platform/board/stopping_sweep.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/output_file.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/report/calibration_plot.hpp"
 #include "platform/report/progress_line.hpp"
@@ -33,9 +36,7 @@ constexpr std::array<const char*, 3> kTitle{"map integration", "map export", "pl
 constexpr std::array<const char*, 3> kKey{"map", "export", "planner"};
 
 void write(const std::string& path, const std::string& text) {
-  if (path.empty()) return;
-  const std::string error = input::write_file(path, text);
-  if (!error.empty()) throw InputError(error);
+  if (!path.empty()) input::write_file(path, text);
 }
 
 std::string plot_of(const board::BoardProfile& board, const board::BoardSweep& sweep) {
@@ -94,7 +95,7 @@ int calibrate_board(const CalibrateOptions& options) {
                                  {"p99_error_max_ratio", s.p99_error.max_relative}};
     }
     fmt::print("{}\n", json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
-    return 0;
+    return kDone;
   }
   fmt::print("{}, {} samples a point, thread time; error on points that were not fitted:\n", board.machine,
              4 * options.repeats);
@@ -112,7 +113,7 @@ int calibrate_board(const CalibrateOptions& options) {
     if (options.backends.planner != "own") fmt::print(" --planner {}", options.backends.planner);
     fmt::print("\n");
   }
-  return 0;
+  return kDone;
 }
 
 int calibrate_stopping(const CalibrateOptions& options) {
@@ -138,7 +139,7 @@ int calibrate_stopping(const CalibrateOptions& options) {
     json["constant_m"] = m.constant_m;
     json["mean_squared_relative_error"] = fit.mean_squared_relative;
     fmt::print("{}\n", json.dump());
-    return 0;
+    return kDone;
   }
   fmt::print("{:>8} {:>11} {:>9} {:>9}\n", "v, m/s", "stop, m", "fit, m", "used, m");
   for (const board::StoppingPoint& p : points) {
@@ -147,7 +148,7 @@ int calibrate_stopping(const CalibrateOptions& options) {
   }
   fmt::print("d_stop = {:.4f} v^2 + {:.4f} v + {:.4f}, relative mean squared error {:.2f} %\n",
              m.quadratic_s2pm, m.linear_s, m.constant_m, 100.0 * fit.mean_squared_relative);
-  return 0;
+  return kDone;
 }
 
 }  // namespace
@@ -165,25 +166,26 @@ void add_calibrate_command(CLI::App& app, std::function<int()>& run) {
       "  roborun calibrate --map octomap --planner ompl:RRTstar --out stock.toml    what the baseline costs\n"
       "  roborun calibrate --stopping                           braking distance of the simulated vehicle");
   command->add_option("--out", options->out, "Write the board profile to this TOML file");
-  command->add_option("--plot", options->plot, "Draw points and models into this SVG file");
-  command->add_option("--map", options->backends.map, "own, octomap, or plugin:FILE.so")
-      ->capture_default_str();
-  command
-      ->add_option("--planner", options->backends.planner,
-                   "own, ompl:NAME such as ompl:RRTstar, or plugin:FILE.so")
-      ->capture_default_str();
-  command->add_option("--repeats", options->repeats, "Passes over the sweep; a point gets 4 samples in each")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
+  CLI::Option* plot =
+      command->add_option("--plot", options->plot, "Draw points and models into this SVG file");
+  CLI::Option* map = command->add_option("--map", options->backends.map, "own, octomap, or plugin:FILE.so")
+                         ->capture_default_str();
+  CLI::Option* planner = command
+                             ->add_option("--planner", options->backends.planner,
+                                          "own, ompl:NAME such as ompl:RRTstar, or plugin:FILE.so")
+                             ->capture_default_str();
+  CLI::Option* repeats = add_whole(*command, "--repeats", options->repeats, 1, 1000,
+                                   "Passes over the sweep, 1 .. 1000; a point gets 4 samples in each");
   command->add_flag("--stopping", options->stopping,
                     "Fly the speed sweep instead and fit the braking distance");
   command->add_flag("--json", options->json, "One line of JSON instead of the table");
-  command->callback([options, &run] {
+  command->callback([=, &run] {
+    for (const CLI::Option* option : {plot, map, planner, repeats})
+      refuse_alone(*option, !options->stopping, "a run without --stopping");
     run = [options] {
-      for (const std::string& path : {options->out, options->plot}) {
-        const std::string error = input::cannot_write(path);
-        if (!error.empty()) throw InputError(error);
-      }
+      const auto plugin = [](const std::string& name) { return name.substr(name.find(':') + 1); };
+      input::check_outputs({{"--out", options->out}, {"--plot", options->plot}},
+                           {plugin(options->backends.map), plugin(options->backends.planner)});
       return options->stopping ? calibrate_stopping(*options) : calibrate_board(*options);
     };
   });

@@ -5,19 +5,23 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <iostream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "firmware_if/dronecan/node.hpp"
+#include "platform/app/exit_code.hpp"
+#include "platform/app/options.hpp"
 #include "platform/can/candump.hpp"
 #include "platform/can/message_json.hpp"
 #include "platform/can/socket_can.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/input_file.hpp"
+#include "platform/input/json_reader.hpp"
+#include "platform/input/stop_signal.hpp"
 
 namespace roborun::app {
 namespace {
@@ -27,16 +31,12 @@ using Json = nlohmann::ordered_json;
 
 /// Calls visit(line, number) for each line of a file, or of standard input if `path` is empty or "-".
 template <typename Visit>
-void for_each_line(const std::string& path, Visit&& visit) {
-  std::ifstream file;
-  const bool standard_input = path.empty() || path == "-";
-  if (!standard_input) {
-    file.open(path);
-    if (!file) throw InputError(fmt::format("{}: cannot be opened", path));
-  }
-  std::istream& in = standard_input ? std::cin : file;
+void for_each_line(const std::string& path, const char* wanted, Visit&& visit) {
+  constexpr std::size_t kMostLine_bytes = 1U << 16U;
+  input::InputFile file =
+      path.empty() || path == "-" ? input::InputFile::standard_input() : input::InputFile(path, wanted);
   std::string line;
-  for (std::size_t number = 1; std::getline(in, line); ++number) visit(line, number);
+  for (std::size_t number = 1; file.line(line, kMostLine_bytes); ++number) visit(line, number);
 }
 
 const char* kind_name(dc::TransferKind kind) {
@@ -44,7 +44,7 @@ const char* kind_name(dc::TransferKind kind) {
   return kind == dc::TransferKind::kRequest ? "request" : "response";
 }
 
-/// One bus of a log: what its nodes are saying.
+/// One bus of a log: what its nodes are saying. 1.1 MB.
 struct ListeningPost {
   // Every type of every node at once.
   std::vector<dc::Reassembler::Session> sessions{dc::kAllTypes.size() * dc::kMostNodeId};
@@ -56,6 +56,9 @@ class Decoder {
   Decoder(std::string source, bool json) : source_(std::move(source)), json_(json) {}
 
   void take(const can::LogLine& line, const std::string& where) {
+    if (posts_.size() == kMostInterfaces && !posts_.contains(line.interface))
+      throw InputError(fmt::format("{}: interface '{}' is one too many: must be at most {} in a log", where,
+                                   line.interface.substr(0, kLongestInterface), kMostInterfaces));
     auto& post = posts_[line.interface];
     if (!post) post = std::make_unique<ListeningPost>();
     dc::Transfer transfer;
@@ -131,8 +134,11 @@ class Decoder {
     out["time_s"] = time_s;
     out["interface"] = line.interface;
     out["fields"] = std::move(fields);
-    fmt::print("{}\n", out.dump());
+    fmt::print("{}\n", out.dump(-1, ' ', false, Json::error_handler_t::replace));
   }
+
+  static constexpr std::size_t kMostInterfaces = 32;
+  static constexpr std::size_t kLongestInterface = 15;  // of the kernel
 
   std::string source_;
   bool json_;
@@ -147,7 +153,7 @@ class Decoder {
 
 int decode(const std::string& path, bool json) {
   Decoder decoder("roborun can decode: ", json);
-  for_each_line(path, [&](const std::string& text, std::size_t number) {
+  for_each_line(path, "a log of candump", [&](const std::string& text, std::size_t number) {
     if (text.find_first_not_of(" \t\r") == std::string::npos) return;
     const auto line = can::parse_log_line(text);
     if (!line) {
@@ -159,7 +165,7 @@ int decode(const std::string& path, bool json) {
     }
   });
   decoder.summarise();
-  return 0;
+  return kDone;
 }
 
 int whole_number(const Json& object, const char* key, int low, int high, std::optional<int> otherwise) {
@@ -170,7 +176,8 @@ int whole_number(const Json& object, const char* key, int low, int high, std::op
   return object[key].get<int>();
 }
 
-void encode_one(const Json& object, std::size_t index) {
+/// The lines of a candump log for one object.
+std::string encode_one(const Json& object, std::size_t index) {
   if (!object.is_object() || !object.contains("type") || !object["type"].is_string())
     throw can::MessageError("must be an object with type, source_node_id and fields");
   dc::TransferHeader header;
@@ -207,23 +214,27 @@ void encode_one(const Json& object, std::size_t index) {
         fmt::format("{} from node {}: an anonymous transfer is a message of type 0 .. 3 of at "
                     "most 7 bytes",
                     name, header.source_node_id));
+  std::string lines;
   for (std::size_t i = 0; i < count.value(); ++i) {
     line.frame = frames.at(i);
-    fmt::print("{}\n", can::format_log_line(line));
+    lines += can::format_log_line(line) + '\n';
   }
+  return lines;
 }
 
 int encode(const std::string& path) {
   std::size_t index = 0;
-  for_each_line(path, [&](const std::string& text, std::size_t number) {
+  for_each_line(path, "a file of JSON objects, one a line", [&](const std::string& text, std::size_t number) {
     if (text.find_first_not_of(" \t\r") == std::string::npos) return;
+    std::string frames;
     try {
-      encode_one(Json::parse(text), index++);
+      frames = encode_one(input::parse_json(text), index++);
     } catch (const std::exception& error) {
-      throw InputError(fmt::format("line {}: {}", number, error.what()));
+      throw InputError(fmt::format("line {}: {}", number, input::json_complaint(error)));
     }
+    fmt::print("{}", frames);
   });
-  return 0;
+  return kDone;
 }
 
 MonotonicTime now() {
@@ -241,7 +252,8 @@ int monitor(const std::string& interface, bool json, double duration_s) {
   Decoder decoder("roborun can monitor: ", json);
   can::LogLine line{.interface = interface, .frame = {}, .data_frame = true};
   const MonotonicTime end = now() + from_seconds(duration_s);
-  while (now() < end) {
+  const input::StopOnSignal stop;
+  while (now() < end && !input::StopOnSignal::requested()) {
     const Status status = bus.receive(line.frame);
     if (status == Status::kOk) {
       decoder.take(line, fmt::format("{:.6f}", seconds(line.frame.stamp.time_since_epoch())));
@@ -257,22 +269,26 @@ int monitor(const std::string& interface, bool json, double duration_s) {
       stderr,
       "{}: {} frames, {} lost in the queue, {} times bus-off, {} error-passive, {} without acknowledge\n",
       interface, c.received, c.lost_on_receive, c.bus_off, c.error_passive, c.no_acknowledge);
-  return 0;
+  return input::StopOnSignal::requested() ? kInterrupted : kDone;
 }
 
-/// Bench only: one throttle on all ESCs for a while, through the same node and gate that fly; zeros before
-/// and after.
-int send_esc(const std::string& interface, bool props_off, int count, double throttle_ratio,
-             double duration_s) {
+/// Bench only: one throttle on one ESC, or on all of them, for a while, through the same node and gate that
+/// fly; zeros before and after, and on the others. `motor`: nothing for all.
+int send_esc(const std::string& interface, bool props_off, int count, std::optional<int> motor,
+             double throttle_ratio, double duration_s) {
   if (!props_off)
     throw InputError("send-esc turns motors: take the propellers off and say so with --props-off");
+  if (motor && *motor >= count)
+    throw InputError(
+        fmt::format("--motor: {} is none of {} ESCs: must be 0 .. {}", *motor, count, count - 1));
   can::SocketCan bus;
   open_or_refuse(bus, interface);
   const auto esc_count = static_cast<std::uint8_t>(count);
   firmware_if::TransmitGate gate({.esc_count = esc_count}, bus);
   std::vector<dc::Reassembler::Session> sessions(32);
   dc::Node node({.node_id = 10, .esc_count = esc_count}, gate, bus, sessions);
-  const std::vector<double> thrust(static_cast<std::size_t>(count), throttle_ratio);
+  std::vector<double> thrust(static_cast<std::size_t>(count), motor ? 0.0 : throttle_ratio);
+  if (motor) thrust.at(static_cast<std::size_t>(*motor)) = throttle_ratio;
   const auto run_for = [&](double s) {
     for (const MonotonicTime end = now() + from_seconds(s); now() < end;) {
       const MonotonicTime t = now();
@@ -296,7 +312,7 @@ int send_esc(const std::string& interface, bool props_off, int count, double thr
                  esc.message.rpm, esc.message.voltage, esc.message.current, esc.message.error_count);
     }
   }
-  return node.counters().commands_refused == 0 ? 0 : 1;
+  return node.counters().commands_refused == 0 ? kDone : kNotGood;
 }
 
 struct CanOptions {
@@ -307,6 +323,8 @@ struct CanOptions {
   double seconds{1e9};
   bool props_off{false};
   int esc_count{4};
+  int motor{-1};
+  bool all_motors{false};
   double throttle_ratio{0.05};
 };
 
@@ -316,30 +334,34 @@ void add_bus_commands(CLI::App& can_app, const std::shared_ptr<CanOptions>& opti
       "monitor", "As decode, live from a SocketCAN interface; counts of errors at the end");
   monitor_app->add_option("interface", options->interface, "can0")->required();
   monitor_app->add_flag("--json", options->json, "As of decode");
-  monitor_app->add_option("--seconds", options->seconds, "Stop after so long; default: never")
-      ->check(CLI::Range(0.0, 1e9));
+  add_number(*monitor_app, "--seconds", options->seconds, 0.0, 1e9,
+             "Stop after so long; default: at Ctrl-C (exit code 130)")
+      ->default_str("");
   monitor_app->callback([options, &run] {
     run = [options] { return monitor(options->interface, options->json, options->seconds); };
   });
 
   CLI::App* esc_app = can_app.add_subcommand(
       "send-esc",
-      "Bench only, without propellers: one throttle on all ESCs for a while, zeros before and after");
+      "Bench only, without propellers: one throttle on one ESC for a while, zeros before and after");
   esc_app->add_option("interface", options->interface, "can0")->required();
   esc_app->add_flag("--props-off", options->props_off, "The propellers are off");
-  esc_app->add_option("--count", options->esc_count, "How many ESCs")
-      ->check(CLI::Range(1, 20))
-      ->capture_default_str();
-  esc_app->add_option("--throttle", options->throttle_ratio, "0 .. 0.3 of full throttle")
-      ->check(CLI::Range(0.0, 0.3))
-      ->capture_default_str();
-  esc_app->add_option("--seconds", options->seconds, "How long, 0.1 .. 60")
-      ->required()
-      ->check(CLI::Range(0.1, 60.0));
+  CLI::Option* motor =
+      esc_app->add_option("--motor", options->motor, "Which ESC: 0 is the first; no other turns")
+          ->check(CLI::Range(0, 19));
+  esc_app->add_flag("--all", options->all_motors, "All of them at once")->excludes(motor);
+  add_whole(*esc_app, "--count", options->esc_count, 1, 20, "How many ESCs, 1 .. 20");
+  add_number(*esc_app, "--throttle", options->throttle_ratio, 0.0, 0.3, "0 .. 0.3 of full throttle");
+  add_number(*esc_app, "--seconds", options->seconds, 0.1, 60.0, "How long, 0.1 .. 60")
+      ->default_str("")
+      ->required();
   esc_app->callback([options, &run] {
     run = [options] {
-      return send_esc(options->interface, options->props_off, options->esc_count, options->throttle_ratio,
-                      options->seconds);
+      if (options->motor < 0 && !options->all_motors)
+        throw InputError("send-esc: which motor is to turn: must have --motor N, or --all");
+      return send_esc(options->interface, options->props_off, options->esc_count,
+                      options->all_motors ? std::nullopt : std::optional(options->motor),
+                      options->throttle_ratio, options->seconds);
     };
   });
 }

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "core/executive/stage_budget.hpp"
+#include "platform/app/exit_code.hpp"
+#include "platform/app/options.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
 
@@ -27,7 +29,12 @@ class Row {
  public:
   Row(const std::map<std::string, std::size_t>& column, std::vector<std::string> field)
       : column_(column), field_(std::move(field)) {}
-  [[nodiscard]] const std::string& text(const std::string& key) const { return field_[column_.at(key)]; }
+  [[nodiscard]] const std::string& text(const std::string& key) const {
+    const auto at = column_.find(key);
+    if (at == column_.end())
+      throw InputError(fmt::format("no column '{}': must be a file that roborun fly --trace wrote", key));
+    return field_[at->second];
+  }
   [[nodiscard]] double number(const std::string& key) const {
     return std::strtod(text(key).c_str(), nullptr);
   }
@@ -171,13 +178,15 @@ void add_explain_command(CLI::App& app, std::function<int()>& run) {
       "Example:\n"
       "  roborun fly --trace flight.csv && roborun explain flight.csv --at 60");
   command->add_option("trace", options->file, "What roborun fly --trace FILE wrote")->required();
-  command->add_option("--at", options->at_s, "Seconds since the start of the mission")->required();
+  add_number(*command, "--at", options->at_s, -1e6, 1e6, "Seconds since the start of the mission")
+      ->default_str("")
+      ->required();
   command->add_option("--design", options->design, "If the trace holds several [the first]");
   command->callback([options, &run] {
     run = [options] {
       const std::string csv = input::read_text(options->file, "a file that roborun fly --trace wrote");
       fmt::print("{}", explain_decision(options->file, csv, options->at_s, options->design));
-      return 0;
+      return kDone;
     };
   });
 }

@@ -10,13 +10,20 @@
 #include <string>
 #include <vector>
 
+#include "platform/app/exit_code.hpp"
+#include "platform/app/options.hpp"
+#include "platform/app/world_arguments.hpp"
 #include "platform/board/board_profile.hpp"
+#include "platform/board/plugin_loader.hpp"
 #include "platform/evaluation/scene.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/output_file.hpp"
+#include "platform/input/stop_signal.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/mission.hpp"
 #include "platform/mission/settings_file.hpp"
+#include "platform/mission/work_check.hpp"
 #include "platform/report/progress_line.hpp"
 #include "platform/report/svg_plot.hpp"
 #include "platform/report/table.hpp"
@@ -36,8 +43,7 @@ struct FlyOptions {
   std::string map{"own"};
   std::string planner{"own"};
   std::string world;
-  std::string start;
-  std::string goal;
+  WorldArguments in_file;
   std::string vehicle{"paper"};
   std::string settings;
   std::string host_file;
@@ -49,34 +55,37 @@ struct FlyOptions {
   bool json{false};
 };
 
-std::optional<Vector3> point_of(const char* option, const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  const std::vector<std::string> parts = input::split(text);
-  Vector3 p_W = Vector3::Zero();
-  bool ok = parts.size() == 3;
-  for (std::size_t i = 0; ok && i < 3; ++i) {
-    char* end = nullptr;
-    p_W[static_cast<Eigen::Index>(i)] = std::strtod(parts[i].c_str(), &end);
-    ok = !parts[i].empty() && *end == '\0';
-  }
-  if (!ok || !is_finite(p_W))
-    throw InputError(fmt::format("{}: '{}' is not a point: must be X,Y,Z in metres", option, text));
-  return p_W;
+std::string host_file_of(const FlyOptions& options) {
+  return options.host_file.empty() ? board::default_host_path({options.map, options.planner})
+                                   : options.host_file;
 }
 
 board::Profile profile_of(const FlyOptions& options) {
-  if (!(options.host_factor > 0.0 && options.host_factor <= 1000.0)) {
-    throw InputError(
-        fmt::format("--host-factor: {} is out of range: must be above 0, at most 1000", options.host_factor));
-  }
   const board::BackendNames backends{options.map, options.planner};
   if (options.profile != "host") return board::load_profile(options.profile, backends);
   std::string note;
-  const board::Profile profile =
-      board::host(options.host_file.empty() ? board::default_host_path(backends) : options.host_file,
-                  backends, options.host_factor, note);
+  const board::Profile profile = board::host(host_file_of(options), backends, options.host_factor, note);
   if (!note.empty()) fmt::print(stderr, "roborun: {}\n", note);
   return profile;
+}
+
+/// Says where what a part counted of its work is worth less than the time it took (mission/work_check.hpp). False
+/// if that part is a plugin: then the flight does not count.
+bool believes(const FlyOptions& options, const report::MissionReport& flown) {
+  bool believed = true;
+  for (const report::WorkRecord& w : flown.work) {
+    if (mission::is_believable(w)) continue;
+    const std::string& part = w.stage == "planner" ? options.planner : options.map;
+    const bool plugin = board::is_plugin(part);
+    fmt::print(
+        stderr,
+        "roborun: {}, {} ({}): took {:.2f} s of this processor, the work that it counted is worth {:.2f} s: "
+        "must be at least 1/{:g} of it{}\n",
+        flown.result.design, w.stage, part, w.measured_s, w.counted_s, mission::kMostUnderstated,
+        plugin ? "; the flight does not count" : "");
+    believed = believed && !plugin;
+  }
+  return believed;
 }
 
 int fly(const FlyOptions& options) {
@@ -94,25 +103,30 @@ int fly(const FlyOptions& options) {
                                  fmt::join(report::kPathColourName, ", ")));
   if (!options.record.empty() && designs.size() != 1)
     throw InputError("--record: one flight a file: must go with one --design");
-  for (const std::string& path : {options.trace, options.plot, options.record}) {
-    const std::string error = input::cannot_write(path);
-    if (!error.empty()) throw InputError(error);
-  }
   mission::MissionConfig config;
-  mission::set_vehicle(config, vehicle::load_vehicle(options.vehicle));
+  const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.vehicle);
+  mission::set_vehicle(config, vehicle);
+  std::vector<std::string> inputs = vehicle.patterns;
+  for (const std::string& path : {options.vehicle, options.world, options.settings, options.profile})
+    inputs.push_back(path);
+  if (options.profile == "host") inputs.push_back(host_file_of(options));
+  for (const std::string& name : {options.map, options.planner})
+    inputs.push_back(name.substr(name.find(':') + 1));  // of a plugin
+  input::check_outputs({{"--record", options.record}, {"--trace", options.trace}, {"--plot", options.plot}},
+                       inputs);
   if (!options.settings.empty()) mission::load_settings(options.settings, config);
-  const sitl::Endpoints endpoints{point_of("--start", options.start), point_of("--goal", options.goal)};
   std::string env;
   std::string title;
   double zone_m = 0.0;
   std::unique_ptr<sitl::World> world;
   if (!options.world.empty()) {
-    world = std::make_unique<sitl::World>(sitl::load_world(options.world, endpoints));
+    world = std::make_unique<sitl::World>(
+        sitl::load_world(options.world, world_options(options.in_file, config.flight.vehicle.radius_m)));
     env = options.world;
     title = fmt::format("{}, seed {}", options.world, seed);
   } else {
-    if (endpoints.start_W || endpoints.goal_W)
-      throw InputError("--start and --goal go with --world FILE: the environments have their own");
+    if (any_given(options.in_file))
+      throw InputError("--start, --goal and the like go with --world FILE: the environments have their own");
     const sitl::NamedEnvironment named = sitl::environment(options.env);
     world = std::make_unique<sitl::World>(sitl::generate(named.knobs, mission, seed));
     env = fmt::format("{}", named.number);
@@ -126,15 +140,36 @@ int fly(const FlyOptions& options) {
   config.profile_name = options.profile;
   config.flight.costs = profile.costs;
   config.flight.model = profile.model;
+  if (options.profile == "host") {
+    config.host_factor = options.host_factor;
+  } else {
+    config.host_costs = board::known_host_costs({options.map, options.planner});
+    if (!config.host_costs && board::uses_plugin({options.map, options.planner}))
+      fmt::print(
+          stderr,
+          "roborun: this machine is not measured: what the plugin counts is compared with the profile {} "
+          "alone (once roborun fly --profile host: with this machine too)\n",
+          options.profile);
+  }
   config.seed = seed;
   config.record = options.record;
   config.backends.map = options.map;
   config.backends.planner = options.planner;
   std::vector<report::MissionReport> reports;
   bool all_reached = true;
+  bool believed = true;
+  const input::StopOnSignal stop;
   for (const governor::Design design : designs) {
     config.flight.design = design;
     report::ProgressLine line;
+    config.each_frame = [&](const mission::FrameRecord& frame) {
+      if (!input::StopOnSignal::requested()) return;
+      throw input::Interrupted(
+          fmt::format("{} after {:.0f} s of flight, {:.0f} m from the goal; {} of {} designs flown; no file "
+                      "was written",
+                      governor::to_string(design), seconds(frame.now.time_since_epoch()),
+                      (world->goal_W() - frame.truth.p_WB).norm(), reports.size(), designs.size()));
+    };
     reports.push_back(mission::fly_mission(*world, config, [&line, design](const mission::Progress& p) {
       if (!line.due()) return;
       line.show(fmt::format("{:<12} {:3.0f} % of the way, {:6.0f} s flown, {:4.1f} m/s, {:3.0f} x real time",
@@ -145,6 +180,7 @@ int fly(const FlyOptions& options) {
     result.env = env;
     result.mission = options.world.empty() ? options.mission : "world_file";
     all_reached = all_reached && result.reached_goal && !result.collided;
+    believed = believes(options, reports.back()) && believed;
   }
 
   if (options.json) {
@@ -157,19 +193,17 @@ int fly(const FlyOptions& options) {
     for (const report::MissionResult& r : results)
       fmt::print("{:<12} state_hash {}, {:.0f} x real time\n", r.design, r.state_hash, r.real_time_factor);
   }
-  std::string error;
-  if (!options.trace.empty()) error = input::write_file(options.trace, report::trace_csv(reports));
-  if (error.empty() && !options.plot.empty()) {
+  if (!options.trace.empty()) input::write_file(options.trace, report::trace_csv(reports));
+  if (!options.plot.empty()) {
     const report::Scene scene = evaluation::scene_of(*world, title, zone_m);
     const auto by = static_cast<report::PathColour>(colour - report::kPathColourName.begin());
-    error = input::write_file(
-        options.plot, maps ? report::maps_svg(scene, reports) : report::mission_svg(scene, reports, by));
+    input::write_file(options.plot,
+                      maps ? report::maps_svg(scene, reports) : report::mission_svg(scene, reports, by));
   }
-  if (!error.empty()) throw InputError(error);
   if (!options.json && !options.plot.empty()) fmt::print("picture: {}\n", options.plot);
   if (!options.json && !options.trace.empty()) fmt::print("trace: {}\n", options.trace);
   if (!options.json && !options.record.empty()) fmt::print("recording: {}\n", options.record);
-  return all_reached ? 0 : 1;
+  return all_reached && believed ? kDone : kNotGood;
 }
 
 }  // namespace
@@ -177,21 +211,23 @@ int fly(const FlyOptions& options) {
 void add_fly_command(CLI::App& app, std::function<int()>& run) {
   const auto options = std::make_shared<FlyOptions>();
   CLI::App* fly_app = app.add_subcommand(
-      "fly", "Fly a mission in simulation: depth images, map, planner, dynamics, all real");
+      "fly",
+      "Fly a mission in simulation: its sensors, vehicle and bus are simulated, what flies them is not");
   fly_app->footer(
       "Examples:\n"
       "  roborun fly                                   environment 14 with the aware design\n"
       "  roborun fly --design aware,static,static-fair --plot flight.svg\n"
       "  roborun fly --env 27 --seed 3 --profile host --json\n"
       "  roborun fly --world house.bt --start 1,2,1.5 --goal 9,4,1.5\n\n"
-      "Exit code: 0 every design reached the goal, 1 at least one did not (the table says why), 2 bad "
-      "input.");
-  fly_app
-      ->add_option("--env", options->env,
-                   "Environment: 1 .. 27, or a name like density0.45-spread80-distance900")
-      ->capture_default_str();
-  fly_app->add_option("--mission", options->mission, "package_delivery or search_and_rescue")
-      ->capture_default_str();
+      "Exit code: 0 every design reached the goal, 1 at least one did not (the table says why), or a plugin "
+      "took more\ntime than the work that it counts is worth, 2 bad input.");
+  CLI::Option* env = fly_app
+                         ->add_option("--env", options->env,
+                                      "Environment: 1 .. 27, or a name like density0.45-spread80-distance900")
+                         ->capture_default_str();
+  CLI::Option* mission =
+      fly_app->add_option("--mission", options->mission, "package_delivery or search_and_rescue")
+          ->capture_default_str();
   fly_app
       ->add_option("--design", options->design,
                    "aware, static (0.5 m/s as published), static-fair; several with commas")
@@ -201,12 +237,12 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
                    "What computing costs: paper (the authors' machine), host (this one), cortex-a72 (an "
                    "estimate), or a file of roborun calibrate")
       ->capture_default_str();
-  fly_app
-      ->add_option("--host-factor", options->host_factor,
-                   "With --profile host: a machine this many times slower")
-      ->capture_default_str();
-  fly_app->add_option("--host-file", options->host_file,
-                      "With --profile host: where the measured costs are kept [~/.cache/roborun/]");
+  CLI::Option* host_factor =
+      add_number(*fly_app, "--host-factor", options->host_factor, 0.001, 1000.0,
+                 "With --profile host: a machine this many times slower, 0.001 .. 1000");
+  CLI::Option* host_file =
+      fly_app->add_option("--host-file", options->host_file,
+                          "With --profile host: where the measured costs are kept [~/.cache/roborun/]");
   fly_app->add_option("--seed", options->seed, "Seed of world, noise, wind and planner")
       ->capture_default_str();
   fly_app->add_option("--map", options->map, "own, octomap, or plugin:FILE.so")->capture_default_str();
@@ -215,9 +251,14 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
                    "own, ompl:NAME with any of OMPL's geometric planners, such as ompl:RRTstar, or "
                    "plugin:FILE.so (see platform/board/plugin.hpp)")
       ->capture_default_str();
-  fly_app->add_option("--world", options->world, "World from a file instead: .toml, or OctoMap .bt / .ot");
-  fly_app->add_option("--start", options->start, "With --world: X,Y,Z in metres");
-  fly_app->add_option("--goal", options->goal, "With --world: X,Y,Z in metres");
+  fly_app
+      ->add_option(
+          "--world", options->world,
+          "World from a file instead: .toml, OctoMap .bt / .ot, SDF .world / .sdf, points .pcd / .ply "
+          "/ .las, meshes .stl / .obj / .dae")
+      ->excludes(env)
+      ->excludes(mission);
+  add_world_arguments(*fly_app, options->in_file);
   fly_app
       ->add_option("--vehicle", options->vehicle,
                    "Vehicle: a shipped one (roborun vehicle list), or a vehicle file")
@@ -228,14 +269,21 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
                       "Write all inputs of the flight to this file, for roborun replay (0.3 MB a decision)");
   fly_app->add_option("--trace", options->trace, "Write every decision to this CSV file");
   fly_app->add_option("--plot", options->plot, "Write a picture of the mission to this SVG file");
-  fly_app
-      ->add_option(
-          "--color", options->colour,
-          "What colours the paths of --plot: speed, precision, volume, latency, visibility, deadline; "
-          "all: a map of each")
-      ->capture_default_str();
+  CLI::Option* colour =
+      fly_app
+          ->add_option(
+              "--color", options->colour,
+              "What colours the paths of --plot: speed, precision, volume, latency, visibility, deadline; "
+              "all: a map of each")
+          ->capture_default_str();
   fly_app->add_flag("--json", options->json, "One JSON object a design on standard output, nothing else");
-  fly_app->callback([options, &run] { run = [options] { return fly(*options); }; });
+  fly_app->callback([=, &run] {
+    const bool host = options->profile == "host";
+    refuse_alone(*host_factor, host, "--profile host");
+    refuse_alone(*host_file, host, "--profile host");
+    refuse_alone(*colour, !options->plot.empty(), "--plot FILE");
+    run = [options] { return fly(*options); };
+  });
 }
 
 }  // namespace roborun::app

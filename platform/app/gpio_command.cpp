@@ -8,7 +8,10 @@
 #include <thread>
 
 #include "firmware_if/kill_switch.hpp"
+#include "platform/app/exit_code.hpp"
+#include "platform/app/options.hpp"
 #include "platform/gpio/gpiod_line.hpp"
+#include "platform/input/input_error.hpp"
 
 namespace roborun::app {
 namespace {
@@ -38,9 +41,8 @@ int list(bool json) {
                  line.consumer.empty() ? "free" : "used by " + line.consumer);
     }
   }
-  if (lines.empty())
-    fmt::print(stderr, "roborun gpio list: no lines: no GPIO chip here, or no right to open one\n");
-  return lines.empty() ? 1 : 0;
+  if (lines.empty()) throw InputError("gpio list: no lines: no GPIO chip here, or no right to open one");
+  return kDone;
 }
 
 int check(const GpioOptions& options) {
@@ -49,10 +51,7 @@ int check(const GpioOptions& options) {
   const auto bias = options.pull_up ? firmware_if::GpioBias::kPullUp : firmware_if::GpioBias::kNone;
   for (const auto& [line, name] : {std::pair{&open, options.open}, std::pair{&closed, options.closed}}) {
     const std::string why = line->open({.name = name, .active_low = options.active_low, .bias = bias});
-    if (!why.empty()) {
-      fmt::print(stderr, "roborun gpio check: {}\n", why);
-      return 1;
-    }
+    if (!why.empty()) throw InputError(why);
   }
   firmware_if::KillSwitch sut(open, closed);
   fmt::print(stderr, "press and release the kill switch within {:.0f} s\n", options.seconds);
@@ -68,7 +67,7 @@ int check(const GpioOptions& options) {
       "{}: {} samples, {} pressed, {} with both lines the same, {} glitches, {} edges\n",
       good ? "good: pressed and released, and the kill stayed" : "NOT GOOD: both positions were not seen",
       counters.samples, counters.pressed, counters.faults, counters.glitches, counters.edges);
-  return good ? 0 : 1;
+  return good ? kDone : kNotGood;
 }
 
 }  // namespace
@@ -91,9 +90,7 @@ void add_gpio_command(CLI::App& app, std::function<int()>& run) {
   check_app->add_option("--closed", options->closed, "Line of the normally closed contact")->required();
   check_app->add_flag("--active-low", options->active_low, "A closed contact pulls its line low");
   check_app->add_flag("--pull-up", options->pull_up, "Switch on the pull-up of the lines");
-  check_app->add_option("--seconds", options->seconds, "How long to wait")
-      ->check(CLI::Range(0.1, 3600.0))
-      ->capture_default_str();
+  add_number(*check_app, "--seconds", options->seconds, 0.1, 3600.0, "How long to wait, 0.1 .. 3600");
   check_app->callback([options, &run] { run = [options] { return check(*options); }; });
 }
 

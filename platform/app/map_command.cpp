@@ -3,12 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
+#include "platform/app/exit_code.hpp"
+#include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/output_file.hpp"
+#include "platform/input/text_file.hpp"
 #include "platform/report/map_picture.hpp"
 #include "platform/sitl/world/octomap_file.hpp"
 
@@ -24,17 +28,9 @@ constexpr int kMostPictureCells = 600;  // on the longer side of a panel
 
 struct MapOptions {
   std::string file, second, output;
-  double height_m{};
-  bool has_height{false};
+  std::optional<double> height_m;
   bool json{false};
 };
-
-void write_file(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw InputError(fmt::format("{}: cannot be written", path));
-}
 
 std::uint64_t cells(const OctomapLeaf& leaf) { return leaf.end() - leaf.morton; }
 
@@ -53,8 +49,8 @@ int info(const MapOptions& options) {
                                          {"occupied_m3", cell_m3 * static_cast<double>(occupied)},
                                          {"min_W", {box.min_W.x(), box.min_W.y(), box.min_W.z()}},
                                          {"max_W", {box.max_W.x(), box.max_W.y(), box.max_W.z()}}};
-    fmt::print("{}\n", json.dump());
-    return 0;
+    fmt::print("{}\n", json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    return kDone;
   }
   fmt::print(
       "{}\nresolution {} m, {} leaves\nfree {:.1f} m3, occupied {:.1f} m3\nfrom ({:.2f}, {:.2f}, {:.2f}) to "
@@ -62,16 +58,17 @@ int info(const MapOptions& options) {
       options.file, map.resolution_m, map.leaves.size(), cell_m3 * static_cast<double>(free),
       cell_m3 * static_cast<double>(occupied), box.min_W.x(), box.min_W.y(), box.min_W.z(), box.max_W.x(),
       box.max_W.y(), box.max_W.z());
-  return 0;
+  return kDone;
 }
 
 int convert(const MapOptions& options) {
   const bool full = sitl::is_full_octomap(options.output);
+  input::check_outputs({{"OUTPUT", options.output}}, {options.file});
   OctomapLeaves map = sitl::load_octomap(options.file);
   map.prune();
-  write_file(options.output, sitl::write_octomap(map, full));
+  input::write_file(options.output, sitl::write_octomap(map, full));
   fmt::print("{}: {} leaves\n", options.output, map.leaves.size());
-  return 0;
+  return kDone;
 }
 
 int compare(const MapOptions& options) {
@@ -94,7 +91,7 @@ int compare(const MapOptions& options) {
         "free\n",
         d.same, d.only_first, d.only_second, d.free_to_occupied, d.occupied_to_free);
   }
-  return d.equal() ? 0 : 1;
+  return d.equal() ? kDone : kNotGood;
 }
 
 /// A panel over two axes: the leaves for which `shown` is true, occupied over free.
@@ -144,9 +141,11 @@ MapPanel panel(const OctomapLeaves& map, std::size_t right, std::size_t up, cons
 }
 
 int view(const MapOptions& options) {
+  const std::string output = options.output.empty() ? options.file + ".svg" : options.output;
+  input::check_outputs({{"--output", output}}, {options.file});
   const OctomapLeaves map = sitl::load_octomap(options.file);
   const Aabb box = map.bounds_W();
-  const double height_m = options.has_height ? options.height_m : box.center().z();
+  const double height_m = options.height_m.value_or(box.center().z());
   if (!(height_m >= box.min_W.z() && height_m < box.max_W.z()))
     throw InputError(fmt::format("--height {}: must be from {:.2f} to below {:.2f} m, where the map is",
                                  height_m, box.min_W.z(), box.max_W.z()));
@@ -164,10 +163,9 @@ int view(const MapOptions& options) {
       panel(map, 0, 1, fmt::format("cut at z = {:.2f} m", height_m), cut(2, index(height_m))),
       panel(map, 0, 2, fmt::format("cut at y = {:.2f} m", box.center().y()),
             cut(1, index(box.center().y())))};
-  const std::string output = options.output.empty() ? options.file + ".svg" : options.output;
-  write_file(output, report::map_svg(fmt::format("{}, {} m", options.file, map.resolution_m), panels));
+  input::write_file(output, report::map_svg(fmt::format("{}, {} m", options.file, map.resolution_m), panels));
   fmt::print("{}\n", output);
-  return 0;
+  return kDone;
 }
 
 }  // namespace
@@ -193,11 +191,10 @@ void add_map_command(CLI::App& app, std::function<int()>& run) {
   diff->add_flag("--json", options->json, "one line of JSON");
   CLI::App* picture = add("view", "draw it: from above, and cut at two planes (SVG)", &view);
   picture->add_option("-o,--output", options->output, "default: FILE.svg");
-  picture->add_option_function<double>(
+  picture->add_option_function<std::string>(
       "--height",
-      [options](double height_m) {
-        options->height_m = height_m;
-        options->has_height = true;
+      [options](const std::string& text) {
+        options->height_m = input::number_of("--height", text, -20e3, 20e3);
       },
       "of the level cut, metres; default: the middle");
 }

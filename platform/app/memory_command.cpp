@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "platform/app/exit_code.hpp"
+#include "platform/app/options.hpp"
 #include "platform/board/board_profile.hpp"
 #include "platform/mission/audit_run.hpp"
 #include "platform/sitl/world/generator.hpp"
@@ -41,18 +43,20 @@ int memory(const MemoryOptions& options) {
   if (options.json) {
     nlohmann::ordered_json j = {{"bytes", total}, {"pools", nlohmann::ordered_json::array()}};
     for (const report::PoolUse& p : pools)
-      j["pools"].push_back({{"name", p.name},
-                            {"element_bytes", p.element_bytes},
-                            {"count", p.count},
-                            {"bytes", p.element_bytes * p.count},
-                            {"high_water", p.tells_use ? nlohmann::ordered_json(p.high_water) : nullptr}});
+      j["pools"].push_back(
+          {{"name", p.name},
+           {"element_bytes", p.element_bytes},
+           {"count", p.count},
+           {"bytes", p.element_bytes * p.count},
+           {"high_water",
+            options.fly_s > 0.0 && p.tells_use ? nlohmann::ordered_json(p.high_water) : nullptr}});
     fmt::print("{}\n", j.dump());
-    return 0;
+    return kDone;
   }
   fmt::print("{:<24} {:>10} {:>10} {:>12} {:>12} {:>6}\n", "pool", "bytes each", "count", "bytes",
              "high water", "used");
   for (const report::PoolUse& p : pools) {
-    const bool known = p.tells_use && p.count > 0;
+    const bool known = options.fly_s > 0.0 && p.tells_use && p.count > 0;
     fmt::print("{:<24} {:>10} {:>10} {:>12} {:>12} {:>6}\n", p.name, p.element_bytes, p.count,
                p.element_bytes * p.count, known ? fmt::format("{}", p.high_water) : "-",
                known ? fmt::format("{:.0f}%",
@@ -61,7 +65,7 @@ int memory(const MemoryOptions& options) {
   }
   fmt::print("{:<24} {:>10} {:>10} {:>12}   {:.1f} MiB\n", "all", "", "", total,
              static_cast<double>(total) / 1048576.0);
-  return 0;
+  return kDone;
 }
 
 }  // namespace
@@ -78,7 +82,8 @@ void add_memory_command(CLI::App& app, std::function<int()>& run) {
       ->add_option("--vehicle", options->vehicle,
                    "Vehicle: a shipped one (roborun vehicle list), or a vehicle file")
       ->capture_default_str();
-  command->add_option("--fly", options->fly_s, "Fly for so many virtual seconds first");
+  add_number(*command, "--fly", options->fly_s, 0.0, 7200.0,
+             "Fly for so many virtual seconds first, 0 .. 7200");
   command->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
   command->callback([options, &run] { run = [options] { return memory(*options); }; });
 }

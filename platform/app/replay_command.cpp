@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "platform/app/exit_code.hpp"
 #include "platform/mission/replay.hpp"
 #include "platform/report/progress_line.hpp"
 
@@ -39,7 +40,7 @@ int replay(const ReplayOptions& options) {
                r.same() ? "the same flight" : "another flight", r.seconds, r.replayed.minor_frames,
                r.replayed.decisions, r.replayed.digest, r.recorded.digest);
   }
-  return r.same() ? 0 : 1;
+  return r.same() ? kDone : kNotGood;
 }
 
 }  // namespace

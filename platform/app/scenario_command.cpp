@@ -11,9 +11,12 @@
 #include <numeric>
 #include <thread>
 
+#include "platform/app/exit_code.hpp"
 #include "platform/evaluation/worker_processes.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/output_file.hpp"
+#include "platform/input/stop_signal.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/scenario_file.hpp"
 #include "platform/report/progress_line.hpp"
@@ -101,46 +104,50 @@ void tell(const json& v) {
 
 int run_scenarios(const ScenarioOptions& options) {
   const int jobs = input::jobs_of(options.jobs);
-  if (const std::string why = input::cannot_write(options.junit); !why.empty()) throw InputError(why);
   // Every file is checked before the first one is flown.
   std::vector<mission::Scenario> scenarios;
-  for (const std::string& file : files_of(options.path)) scenarios.push_back(mission::load_scenario(file));
+  std::vector<std::string> inputs;
+  for (const std::string& file : files_of(options.path)) {
+    scenarios.push_back(mission::load_scenario(file));
+    inputs.push_back(file);
+    inputs.insert(inputs.end(), scenarios.back().files.begin(), scenarios.back().files.end());
+  }
+  input::check_outputs({{"--junit", options.junit}}, inputs);
 
   std::vector<json> verdicts(scenarios.size());
   std::vector<std::size_t> tasks(scenarios.size());
   std::iota(tasks.begin(), tasks.end(), std::size_t{0});
   std::size_t done = 0;
+  std::size_t failed = 0;
+  const input::StopOnSignal stop;
   report::ProgressLine line;
   evaluation::WorkerCalls calls;
-  calls.work = [&](std::size_t i) { return verdict_of(scenarios[i]).dump(); };
+  calls.work = [&](std::size_t i) {
+    return verdict_of(scenarios[i]).dump(-1, ' ', false, json::error_handler_t::replace);
+  };
   calls.answered = [&](std::size_t i, const std::string& answer) {
     verdicts[i] = json::parse(answer);
     ++done;
+    failed += verdicts[i]["passed"] ? 0U : 1U;
     if (line.due()) line.show(fmt::format("{} of {} scenarios flown", done, scenarios.size()));
   };
   calls.died = [&](std::size_t i) {
     throw InputError(fmt::format("{}: the flight's process died", scenarios[i].name));
   };
-  (void)evaluation::run_in_processes(tasks, jobs, calls);
+  calls.go_on = [] { return !input::StopOnSignal::requested(); };
+  if (!evaluation::run_in_processes(tasks, jobs, calls))
+    throw input::Interrupted(fmt::format("{} of {} scenarios flown, {} of them failed; no file was written",
+                                         done, scenarios.size(), failed));
 
-  const bool passed =
-      std::all_of(verdicts.begin(), verdicts.end(), [](const json& v) { return v["passed"]; });
   for (const json& v : verdicts) {
     if (options.json)
       fmt::print("{}\n", v.dump());
     else
       tell(v);
   }
-  if (!options.json) {
-    const auto good =
-        std::count_if(verdicts.begin(), verdicts.end(), [](const json& v) { return v["passed"]; });
-    fmt::print("{} of {} passed\n", good, verdicts.size());
-  }
-  if (!options.junit.empty()) {
-    if (const std::string why = input::write_file(options.junit, junit_of(verdicts)); !why.empty())
-      throw InputError(why);
-  }
-  return passed ? 0 : 1;
+  if (!options.json) fmt::print("{} of {} passed\n", verdicts.size() - failed, verdicts.size());
+  if (!options.junit.empty()) input::write_file(options.junit, junit_of(verdicts));
+  return failed == 0 ? kDone : kNotGood;
 }
 
 }  // namespace

@@ -5,16 +5,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iostream>
-#include <iterator>
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "governor/solver/certificate.hpp"
+#include "platform/app/exit_code.hpp"
 #include "platform/board/board_profile.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/json_reader.hpp"
+#include "platform/input/text_file.hpp"
 
 namespace roborun::app {
 namespace {
@@ -151,16 +152,15 @@ Json answer(const Json& json, std::size_t number) {
 }  // namespace
 
 std::string solve_json(const std::string& text) {
-  Json input;
+  Json problems;
   try {
-    input = Json::parse(quote_literals(text));
-  } catch (const Json::exception& error) {
-    const std::string what = error.what();
-    throw InputError(fmt::format("standard input: not JSON: {}", what.substr(what.find("] ") + 2)));
+    problems = input::parse_json(quote_literals(text));
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("standard input: {}", error.what()));
   }
-  if (!input.is_array()) return answer(input, 1).dump();
+  if (!problems.is_array()) return answer(problems, 1).dump();
   Json output = Json::array();
-  for (std::size_t i = 0; i < input.size(); ++i) output.push_back(answer(input[i], i + 1));
+  for (std::size_t i = 0; i < problems.size(); ++i) output.push_back(answer(problems[i], i + 1));
   return output.dump();
 }
 
@@ -186,10 +186,10 @@ void add_solve_command(CLI::App& app, std::function<int()>& run) {
   command->add_flag("--json", *json, "One line of JSON (the default is indented for people)");
   command->callback([json, &run] {
     run = [json] {
-      const std::string text(std::istreambuf_iterator<char>(std::cin), {});
-      const std::string line = solve_json(text);
+      input::InputFile in = input::InputFile::standard_input();
+      const std::string line = solve_json(input::read_text(in, "one problem, or a list of them"));
       fmt::print("{}\n", *json ? line : Json::parse(line).dump(2));
-      return 0;
+      return kDone;
     };
   });
 }

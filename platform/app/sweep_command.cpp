@@ -10,12 +10,16 @@
 #include <thread>
 
 #include "core/record/state_hash.hpp"
+#include "platform/app/exit_code.hpp"
 #include "platform/board/backends.hpp"
 #include "platform/evaluation/sweep_run.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/output_file.hpp"
+#include "platform/input/stop_signal.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/settings_file.hpp"
+#include "platform/report/build_identity.hpp"
 #include "platform/report/evaluation_table.hpp"
 #include "platform/sitl/world/generator.hpp"
 
@@ -60,6 +64,12 @@ std::string profile_digest(const board::Profile& profile) {
     for (const double s : model.slope_s_per_m3) hash.add(s);
   }
   return fmt::format("{:016x}", hash.value());
+}
+
+constexpr std::size_t kMostProgram_bytes = 1U << 30U;
+
+std::string program_digest() {
+  return evaluation::digest_of(input::read_text("/proc/self/exe", "this program", kMostProgram_bytes));
 }
 
 void set_shard(const std::string& text, evaluation::SweepPlan& plan) {
@@ -108,9 +118,12 @@ evaluation::SweepPlan plan_of(const SweepOptions& options, evaluation::SweepInpu
     mission::load_settings(options.settings, inputs.base);
     plan.settings = evaluation::digest_of(input::read_text(options.settings, "a readable TOML file"));
   }
+  inputs.files = vehicle.patterns;
+  for (const std::string& path : {options.vehicle, options.settings}) inputs.files.push_back(path);
   std::vector<std::string> names;
   for (const std::string& text : input::split(options.profiles)) {
     const board::Profile profile = board::load_profile(text, {plan.map, plan.planner});
+    inputs.files.push_back(text);
     // Machines of a cluster keep the same file in different folders.
     const std::string name = std::filesystem::path(text).stem().string();
     names.push_back(name);
@@ -118,7 +131,8 @@ evaluation::SweepPlan plan_of(const SweepOptions& options, evaluation::SweepInpu
     inputs.profile[name] = profile;
   }
   refuse_twice("--profile", names);
-  plan.build = evaluation::digest_of(input::read_text("/proc/self/exe", "this program"));
+  plan.commit = report::build_identity().commit;
+  plan.build = program_digest();
   return plan;
 }
 
@@ -144,29 +158,44 @@ int sweep(const SweepOptions& options) {
   const evaluation::SweepPlan plan = plan_of(options, inputs);
   const int jobs = input::jobs_of(options.jobs);
   evaluation::try_sweep(plan, inputs);
+  evaluation::check_folder(options.out, inputs.files);
   evaluation::SweepStore store(options.out, plan);
   const bool complete = evaluation::fly_sweep(store, inputs, jobs);
   tell(store, options);
-  if (!complete)
-    fmt::print(stderr, "roborun: stopped; what was flown is kept: the same command goes on from there\n");
-  return complete ? 0 : 1;
+  constexpr const char* kKept = "what was flown is kept: the same command goes on from there";
+  if (input::StopOnSignal::requested()) throw input::Interrupted(kKept);
+  if (!complete) fmt::print(stderr, "roborun: not all was flown; {}\n", kKept);
+  return complete ? kDone : kNotGood;
 }
 
 int merge(const SweepOptions& options) {
+  // The report is made here: it must come from the sources that flew. A commit names them if nothing was changed;
+  // then another machine's program may have flown.
+  const evaluation::SweepPlan flown = evaluation::plan_of_folder(options.merged.front());
+  const bool named = flown.commit.size() == 40;
+  if (flown.commit != report::build_identity().commit || (!named && flown.build != program_digest()))
+    throw InputError(fmt::format(
+        "{}: was flown by commit {}, program {}; this is of {}, {}: must be merged by the program that flew",
+        options.merged.front(), flown.commit.empty() ? "unknown" : flown.commit, flown.build,
+        report::build_identity().commit, program_digest()));
   evaluation::merge_shards(options.merged, options.out);
   const evaluation::SweepStore store(options.out, evaluation::plan_of_folder(options.out));
   tell(store, options);
-  return store.complete() ? 0 : 1;
+  return store.complete() ? kDone : kNotGood;
 }
 
 int compare(const SweepOptions& options) {
   std::vector<report::SweepRow> rows;
+  std::string sources;
   for (const std::string& folder : options.merged) {
     const evaluation::SweepStore store(folder, evaluation::plan_of_folder(folder));
+    const std::string& commit = store.plan().commit;
+    sources += fmt::format("{}: commit {}, program {}\n", folder, commit.empty() ? "unknown" : commit,
+                           store.plan().build);
     for (report::SweepRow& row : evaluation::rows_of(store)) rows.push_back(std::move(row));
   }
-  fmt::print("{}", report::kernel_table(rows));
-  return 0;
+  fmt::print("{}\n{}", report::kernel_table(rows), sources);
+  return kDone;
 }
 
 void add_compare_command(CLI::App& sweep_app, const std::shared_ptr<SweepOptions>& options,
@@ -217,9 +246,10 @@ void add_sweep_command(CLI::App& app, std::function<int()>& run) {
       "gains\n\n"
       "The folder --out holds request.json, results.jsonl (one line a mission) and report.html (tables and\n"
       "pictures, opens offline). Stopped by Ctrl-C or power loss, the same command goes on. Results do not\n"
-      "depend on --jobs, machine or order.\n"
-      "Exit code: 0 every mission was flown (whether it reached the goal is in the table), 1 stopped before "
-      "that,\n2 bad input.");
+      "depend on --jobs, machine or order. A folder holds the flights of one commit: another one is "
+      "refused.\n"
+      "Exit code: 0 every mission was flown (whether it reached the goal is in the table), 1 a flight's "
+      "process died,\n2 bad input, 130 stopped.");
   sweep_app->add_option("--suite", options->suite, "Set of environments: paper27")->capture_default_str();
   sweep_app->add_option("--environments", options->environments,
                         "Only these of the suite, by number or name, with commas [all]");

@@ -1,7 +1,9 @@
 #include "platform/app/vehicle_command.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -9,6 +11,7 @@
 
 #include "core/geometry/math.hpp"
 #include "governor/policy/governor.hpp"
+#include "platform/app/exit_code.hpp"
 #include "platform/board/backends.hpp"
 #include "platform/flight/flight_system.hpp"
 #include "platform/input/input_error.hpp"
@@ -66,6 +69,20 @@ Consequences consequences_of(const vehicle::Vehicle& vehicle) {
   return c;
 }
 
+/// Names of the models of its sensors, each once, in their order.
+std::vector<std::string> models_of(const SensorRig& rig) {
+  std::vector<std::string> names;
+  const auto add = [&names](const char* kind, auto model) {
+    std::string name = fmt::format("{} {}", kind, to_string(model));
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(std::move(name));
+  };
+  for (const CameraSpec& camera : rig.cameras) add("camera", camera.model);
+  for (const LidarSpec& lidar : rig.lidars) add("lidar", lidar.model);
+  add("imu", rig.imu);
+  add("gnss", rig.gnss);
+  return names;
+}
+
 /// What it cannot do, one line each.
 std::vector<std::string> shortcomings_of(const vehicle::Vehicle& vehicle, const Consequences& c) {
   std::vector<std::string> lines;
@@ -97,6 +114,7 @@ int check(const VehicleOptions& options) {
                                 {"hover_throttle_ratio", c.hover_ratio},
                                 {"tilt_acceleration_mps2", c.tilt_mps2},
                                 {"stopping", nlohmann::ordered_json::array()},
+                                {"sensor_models", models_of(vehicle.rig)},
                                 {"range_m", c.range_m},
                                 {"blind_deg", c.blind_deg},
                                 {"fastest_mps", c.fastest_mps},
@@ -106,7 +124,7 @@ int check(const VehicleOptions& options) {
     for (const auto& [speed_mps, distance_m] : c.stop)
       j["stopping"].push_back({{"speed_mps", speed_mps}, {"distance_m", distance_m}});
     fmt::print("{}\n", j.dump());
-    return 0;
+    return kDone;
   }
   fmt::print("{}: {}\n\n", vehicle.name, vehicle.about);
   fmt::print("thrust to weight     {:.2f}, hovers at {:.0f} % of full throttle\n", c.thrust_to_weight_ratio,
@@ -119,11 +137,12 @@ int check(const VehicleOptions& options) {
                speed_mps < vehicle.model.speed_mps ? "," : "\n");
   fmt::print("sees                 {:.0f} m: enough for {:.1f} m/s, when it thinks for 0.2 s\n", c.range_m,
              c.fastest_mps);
+  fmt::print("simulated with       {}\n", fmt::join(models_of(vehicle.rig), ", "));
   fmt::print("widest blind angle   {:.0f} degrees\n", c.blind_deg);
   fmt::print("memory               {:.1f} MiB in a world of 100 x 100 x 10 m\n",
              static_cast<double>(c.bytes) / 1048576.0);
   for (const std::string& line : cannot) fmt::print("it                   {}\n", line);
-  return 0;
+  return kDone;
 }
 
 int list(const VehicleOptions& options) {
@@ -136,7 +155,7 @@ int list(const VehicleOptions& options) {
       fmt::print("{:<8} {}\n", v.name, v.about);
   }
   if (options.json) fmt::print("{}\n", all.dump());
-  return 0;
+  return kDone;
 }
 
 }  // namespace

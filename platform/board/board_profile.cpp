@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <time.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +9,9 @@
 #include <filesystem>
 
 #include "core/geometry/camera_pose.hpp"
+#include "platform/board/plugin_loader.hpp"
 #include "platform/board/shipped_boards.hpp"
+#include "platform/board/thread_time.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/input/toml_reader.hpp"
@@ -38,13 +39,9 @@ constexpr std::array<const char*, 3> kStageName{"map", "export", "planner"};
 /// Seconds of this thread's own processor time.
 template <typename Work>
 double timed(Work&& work) {
-  timespec begin{};
-  timespec end{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &begin);
+  const double begin_s = thread_time_s();
   work();
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &end);
-  return static_cast<double>(end.tv_sec - begin.tv_sec) +
-         1e-9 * static_cast<double>(end.tv_nsec - begin.tv_nsec);
+  return thread_time_s() - begin_s;
 }
 
 /// Six images from a hover; the memory behind them lives as long as this does.
@@ -366,11 +363,25 @@ Profile host(const std::string& path, const BackendNames& backends, double facto
   const std::string text = to_toml(measure_board(backends, 2, {}, sweep));
   std::error_code ignored;
   std::filesystem::create_directories(std::filesystem::path(path).parent_path(), ignored);
-  const std::string error = input::write_file(path, text);
-  note = error.empty()
-             ? fmt::format("measured this machine quickly, kept in {} (better: roborun calibrate)", path)
-             : fmt::format("measured this machine for this run only: {}", error);
+  try {
+    input::write_file(path, text);
+    note = fmt::format("measured this machine quickly, kept in {} (better: roborun calibrate)", path);
+  } catch (const InputError& error) {
+    note = fmt::format("measured this machine for this run only: {}", error.what());
+  }
   return profile_for(path, text, backends, factor);
+}
+
+std::optional<core::CostProfile> known_host_costs(BackendNames backends) {
+  if (is_plugin(backends.map)) backends.map = "own";
+  if (is_plugin(backends.planner)) backends.planner = "own";
+  const std::string path = default_host_path(backends);
+  if (!std::filesystem::exists(path)) return std::nullopt;
+  try {
+    return profile_for(path, input::read_text(path, "a readable file"), backends, 1.0).costs;
+  } catch (const InputError&) {
+    return std::nullopt;  // --profile host says what is wrong with it
+  }
 }
 
 Profile load_profile(const std::string& name, const BackendNames& backends) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -64,6 +65,9 @@ struct BoardSweep {
 /// only. Throws InputError for a malformed file, and for one of other backends.
 [[nodiscard]] Profile host(const std::string& path, const BackendNames& backends, double factor,
                            std::string& note);
+/// The costs of this machine from the file of default_host_path(), with the own parts in the place of plugins;
+/// nothing if it was not measured yet, or the file is of no use.
+[[nodiscard]] std::optional<core::CostProfile> known_host_costs(BackendNames backends);
 /// "paper", "host" (from its default path), "cortex-a72" (shipped: an estimate), or the path of a board file.
 /// paper charges by volume, whatever computes; the others what `backends` cost. Throws InputError,
 /// also for a board that was measured with other backends.

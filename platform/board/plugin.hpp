@@ -11,6 +11,8 @@
 ///   add_library(straight_planner MODULE straight_planner.cpp)
 ///   target_link_libraries(straight_planner PRIVATE roborun::plugin)
 ///
+/// It counts its work (stages::PlanResult::work, stages::OccupancyMap): in lockstep a flight is charged for that,
+/// and what it says is compared with the time it took (platform/mission/work_check.hpp).
 /// The class has a constructor from `const board::PartRequest&`, or none. A shared object may hold one planner
 /// and one map. Not for programs: it defines an entry.
 #pragma once

@@ -7,6 +7,7 @@
 
 #include "core/record/state_hash.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/json_reader.hpp"
 
 namespace roborun::evaluation {
 namespace {
@@ -14,7 +15,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json json_of(const SweepPlan& p) {
-  Json json{{"build", p.build}, {"suite", p.suite}, {"mission", p.mission}, {"environments", p.environments}};
+  Json json{{"commit", p.commit}, {"build", p.build}, {"suite", p.suite}, {"mission", p.mission}};
+  json["environments"] = p.environments;
   json["profiles"] = Json::array();
   for (const SweepPlan::ProfileId& id : p.profiles)
     json["profiles"].push_back({{"name", id.name}, {"digest", id.digest}});
@@ -70,8 +72,9 @@ std::string to_json(const SweepPlan& plan) {
 
 SweepPlan plan_from_json(const std::string& path, const std::string& text) {
   try {
-    const Json json = Json::parse(text);
+    const Json json = input::parse_json(text);
     SweepPlan p;
+    p.commit = json.value("commit", "");
     p.build = json.at("build");
     p.suite = json.at("suite");
     p.mission = json.at("mission");
@@ -88,7 +91,7 @@ SweepPlan plan_from_json(const std::string& path, const std::string& text) {
                        p.shard <= p.shards && !p.environments.empty() && !p.profiles.empty() &&
                        !p.designs.empty() && !p.seeds.empty();
     if (whole) return p;
-  } catch (const nlohmann::json::exception&) {  // below
+  } catch (const std::exception&) {  // below
   }
   throw InputError(fmt::format("{}: is not a sweep's request: give a folder of roborun sweep", path));
 }

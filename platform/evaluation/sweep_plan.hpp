@@ -23,7 +23,8 @@ struct SweepPlan {
     std::string name;
     std::string digest;  ///< Of the numbers in it.
   };
-  std::string build;  ///< Digest of the program that flies.
+  std::string commit;  ///< Of the sources (report::BuildIdentity); empty in plans of before it was kept.
+  std::string build;   ///< Digest of the program that flies.
   std::string suite{"paper27"};
   std::string mission{"package_delivery"};
   std::vector<int> environments;  ///< Ascending.

@@ -72,8 +72,7 @@ class Page {
 
  private:
   void write(const std::string& name, const std::string& text) {
-    const std::string error = input::write_file(store_.folder() + "/" + name, text);
-    if (!error.empty()) throw InputError(error);
+    input::write_file(store_.folder() + "/" + name, text);
   }
   const SweepStore& store_;
   std::string html_;
@@ -90,10 +89,11 @@ void write_sweep_report(const SweepStore& store) {
   Page page(store, fmt::format("roborun sweep {}: {} environments, seeds {}", plan.suite,
                                plan.environments.size(), fmt::join(plan.seeds, ", ")));
   page.text("Overall",
-            fmt::format("{}\nmission {}, map {}, planner {}, settings {}, build {}; {} of {} missions\n",
+            fmt::format("{}\nmission {}, map {}, planner {}, settings {}; {} of {} missions\n"
+                        "commit {}, program {}\n",
                         report::sweep_table(rows), plan.mission, plan.map, plan.planner,
-                        plan.settings.empty() ? "default" : plan.settings, plan.build, rows.size(),
-                        store.missions().size()));
+                        plan.settings.empty() ? "default" : plan.settings, rows.size(),
+                        store.missions().size(), plan.commit.empty() ? "unknown" : plan.commit, plan.build));
   page.picture("Overall metrics", "overall.svg", report::overall_svg(rows));
   for (const std::string& profile : profiles) {
     page.picture(

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <csignal>
 
 #include "platform/evaluation/worker_processes.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/stop_signal.hpp"
 #include "platform/mission/flight_setup.hpp"
 #include "platform/report/flight_record.hpp"
 #include "platform/report/progress_line.hpp"
@@ -18,30 +18,6 @@
 
 namespace roborun::evaluation {
 namespace {
-
-volatile std::sig_atomic_t interrupted = 0;
-
-/// Ctrl-C and SIGTERM end the sweep at the next tick instead of the process at once.
-class StopOnSignal {
- public:
-  StopOnSignal() {
-    interrupted = 0;
-    struct sigaction action {};
-    action.sa_handler = [](int) { interrupted = 1; };
-    (void)sigaction(SIGINT, &action, &int_);
-    (void)sigaction(SIGTERM, &action, &term_);
-  }
-  ~StopOnSignal() {
-    (void)sigaction(SIGINT, &int_, nullptr);
-    (void)sigaction(SIGTERM, &term_, nullptr);
-  }
-  StopOnSignal(const StopOnSignal&) = delete;
-  StopOnSignal& operator=(const StopOnSignal&) = delete;
-
- private:
-  struct sigaction int_ {};
-  struct sigaction term_ {};
-};
 
 mission::MissionConfig config_of(const SweepPlan& plan, const SweepInputs& inputs,
                                  const SweepMission& mission) {
@@ -152,7 +128,7 @@ bool fly_sweep(SweepStore& store, const SweepInputs& inputs, int jobs) {
   for (std::size_t i = 0; i < missions.size(); ++i) {
     if (!store.has(i)) left.push_back(i);
   }
-  const StopOnSignal guard;
+  const input::StopOnSignal stop;
   report::ProgressLine line;
   Forecast forecast(missions, jobs);
   const std::vector<std::size_t> tasks = left;
@@ -188,7 +164,7 @@ bool fly_sweep(SweepStore& store, const SweepInputs& inputs, int jobs) {
                             bar(done, missions.size()), done, missions.size(), failed,
                             clock_of(line.elapsed_s()), clock_of(forecast.left_s(left, line.elapsed_s()))));
     }
-    return interrupted == 0;
+    return !input::StopOnSignal::requested();
   };
   start();
   const bool to_the_end = run_in_processes(tasks, jobs, calls);

@@ -16,6 +16,7 @@ namespace roborun::evaluation {
 struct SweepInputs {
   std::map<std::string, board::Profile> profile;  ///< By the plan's names.
   mission::MissionConfig base{};                  ///< With the settings in it.
+  std::vector<std::string> files;  ///< All that was read for them; not in the folder of the sweep.
 };
 
 /// Throws InputError for a map, planner or settings that no mission of the plan could fly with; nothing

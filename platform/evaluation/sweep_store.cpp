@@ -6,13 +6,14 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <optional>
+#include <thread>
 
 #include "platform/input/input_error.hpp"
+#include "platform/input/text_file.hpp"
 #include "platform/report/result_line.hpp"
 
 namespace roborun::evaluation {
@@ -23,17 +24,45 @@ constexpr const char* kResults = "results.jsonl";
 
 std::string flight_name(const SweepMission& m) { return fmt::format("flight_{}_{}.json", m.design, m.seed); }
 
+/// Nothing if there is no such file.
 std::optional<std::string> read_file(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return std::nullopt;
-  return std::string(std::istreambuf_iterator<char>(file), {});
+  constexpr std::size_t kMost_bytes = 1U << 30U;
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return std::nullopt;
+  return input::read_text(path, "a readable file of roborun sweep", kMost_bytes);
+}
+
+/// What was flown with which sources, if that is what two plans differ in.
+std::string both_commits(const SweepPlan& held, const SweepPlan& wanted, const std::string& key) {
+  if (key != "commit") return {};
+  return fmt::format(" ({}; this program is of {})", held.commit.empty() ? "unknown" : held.commit,
+                     wanted.commit);
 }
 
 [[noreturn]] void cannot(const std::string& path) {
   throw InputError(fmt::format("{}: cannot be written: {}", path, strerror(errno)));
 }
 
-void write_all(int fd, const std::string& text, const std::string& path) {
+/// The children of a sweep that was killed hold its lock until they are dead, too: moments.
+bool lock_soon(int fd) {
+  constexpr int kTries = 20;
+  constexpr std::chrono::milliseconds kPause{50};
+  for (int i = 0; i < kTries; ++i) {
+    if (flock(fd, LOCK_EX | LOCK_NB) == 0) return true;
+    std::this_thread::sleep_for(kPause);
+  }
+  return false;
+}
+
+/// What a process that was killed had begun: the folder is ours alone now.
+void remove_parts(const std::string& folder) {
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.is_regular_file() && entry.path().extension() == ".part") std::filesystem::remove(entry.path());
+  }
+}
+
+/// At the end of the results, and on the disk.
+void append(int fd, const std::string& text, const std::string& path) {
   for (std::size_t at = 0; at < text.size();) {
     const ssize_t n = write(fd, text.data() + at, text.size() - at);
     if (n < 0 && errno != EINTR) cannot(path);
@@ -42,21 +71,18 @@ void write_all(int fd, const std::string& text, const std::string& path) {
   if (fsync(fd) != 0) cannot(path);
 }
 
-/// The whole file or none of it, whenever the power goes.
-void write_durably(const std::string& folder, const std::string& name, const std::string& text) {
-  const std::string path = folder + "/" + name;
-  const std::string part = path + ".part";
-  const int fd = open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (fd < 0) cannot(path);
-  write_all(fd, text, path);
-  (void)close(fd);
-  if (rename(part.c_str(), path.c_str()) != 0) cannot(path);
-  const int directory = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (directory < 0 || fsync(directory) != 0) cannot(path);
-  (void)close(directory);
-}
-
 }  // namespace
+
+void check_folder(const std::string& folder, const std::vector<std::string>& inputs) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  for (const std::string& in : inputs) {
+    if (in.empty() || !fs::is_regular_file(in, error)) continue;
+    if (fs::equivalent(fs::canonical(in, error).parent_path(), folder, error))
+      throw InputError(
+          fmt::format("--out: {}: {} is read, and lies in it: must be another folder", folder, in));
+  }
+}
 
 SweepPlan plan_of_folder(const std::string& folder) {
   const std::string path = folder + "/" + kRequest;
@@ -72,21 +98,23 @@ SweepStore::SweepStore(std::string folder, SweepPlan plan)
   if (error) throw InputError(fmt::format("{}: cannot be made: {}", folder_, error.message()));
   lock_ = open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (lock_ < 0) cannot(folder_);
-  if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+  if (!lock_soon(lock_)) {
     (void)close(lock_);
     throw InputError(fmt::format("{}: another process is sweeping into it: give another --out", folder_));
   }
   try {
+    remove_parts(folder_);
     if (std::filesystem::exists(path(kRequest))) {
-      const std::string key = difference(plan_of_folder(folder_), plan_);
+      const SweepPlan held = plan_of_folder(folder_);
+      const std::string key = difference(held, plan_);
       if (!key.empty()) {
-        throw InputError(
-            fmt::format("{}: holds a sweep with other {}: give another --out, or remove it", folder_, key));
+        throw InputError(fmt::format("{}: holds a sweep with other {}{}: give another --out, or remove it",
+                                     folder_, key, both_commits(held, plan_, key)));
       }
     } else if (std::filesystem::exists(path(kResults))) {
       throw InputError(fmt::format("{}: holds results without a {}: give another --out", folder_, kRequest));
     } else {
-      write_durably(folder_, kRequest, to_json(plan_));
+      input::write_file(path(kRequest), to_json(plan_));
     }
     take_lines(read_file(path(kResults)).value_or(""));
     file_ = open(path(kResults).c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
@@ -124,12 +152,12 @@ void SweepStore::take_lines(const std::string& text) {
     if (!lines_.emplace(found->second, line).second) continue;
     kept += line + '\n';
   }
-  if (kept != text) write_durably(folder_, kResults, kept);
+  if (kept != text) input::write_file(path(kResults), kept);
 }
 
 void SweepStore::add(std::size_t mission, const std::string& line, const std::string& flight) {
-  if (!flight.empty()) write_durably(folder_, flight_name(missions_[mission]), flight);
-  write_all(file_, line + '\n', path(kResults));
+  if (!flight.empty()) input::write_file(path(flight_name(missions_[mission])), flight);
+  append(file_, line + '\n', path(kResults));
   lines_[mission] = line;
 }
 
@@ -137,7 +165,7 @@ void SweepStore::sort() {
   std::string text;
   for (const auto& [index, line] : lines_) text += line + '\n';
   if (read_file(path(kResults)).value_or("") == text) return;
-  write_durably(folder_, kResults, text);
+  input::write_file(path(kResults), text);
   (void)close(file_);
   file_ = open(path(kResults).c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
   if (file_ < 0) cannot(path(kResults));
@@ -161,8 +189,8 @@ void merge_shards(const std::vector<std::string>& folders, const std::string& ou
     plan.shard = plan.shards = 1;
     const std::string key = difference(plan, whole);
     if (!key.empty())
-      throw InputError(fmt::format("{}: its {} are not those of {}: shards of one sweep only", folder, key,
-                                   folders.front()));
+      throw InputError(
+          fmt::format("{}: has other {} than {}: must be shards of one sweep", folder, key, folders.front()));
   }
   SweepStore merged(out, whole);
   std::map<std::string, std::size_t> index;

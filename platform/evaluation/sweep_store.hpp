@@ -50,6 +50,9 @@ class SweepStore {
   int file_{-1};
 };
 
+/// Throws InputError if one of the files that a sweep reads lies in the folder that it writes.
+void check_folder(const std::string& folder, const std::vector<std::string>& inputs);
+
 /// The plan of a folder that exists. Throws InputError.
 [[nodiscard]] SweepPlan plan_of_folder(const std::string& folder);
 

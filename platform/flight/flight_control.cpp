@@ -18,7 +18,7 @@ constexpr double kStand_m = 0.5;
 constexpr double kStand_mps = 0.3;
 constexpr double kNearGround_m = 1.5;  // over the take-off's height: from there on slowly
 constexpr double kTouchdown_mps = 0.5;
-constexpr double kBelowGround_m = 20.0;  // the reference goes on until the vehicle stands on something
+constexpr double kBelowGround_m = 500.0;  // the reference goes on until the vehicle stands on something
 constexpr Nanos kLanded{1'000'000'000};
 
 /// Straight up from the ground to the height of the first hover.

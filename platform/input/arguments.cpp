@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <cmath>
 #include <sstream>
 
 #include "platform/input/input_error.hpp"
@@ -25,23 +26,35 @@ std::optional<int> whole_number(const std::string& text, int low, int high) {
   return value;
 }
 
-int jobs_of(const std::string& text) {
-  const auto jobs = whole_number(text, 1, 1024);
-  if (!jobs)
-    throw InputError(
-        fmt::format("--jobs: '{}' is out of range: must be a whole number from 1 to 1024", text));
-  return *jobs;
+std::optional<double> number(const std::string& text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
 }
 
-std::uint64_t seed_of(const char* option, const std::string& text) {
-  std::size_t used = 0;
+int whole_of(std::string_view option, const std::string& text, int low, int high) {
+  const auto value = whole_number(text, low, high);
+  if (!value)
+    throw InputError(fmt::format("{}: '{}' is out of range: must be a whole number from {} to {}", option,
+                                 text, low, high));
+  return *value;
+}
+
+double number_of(std::string_view option, const std::string& text, double low, double high) {
+  const auto value = number(text);
+  if (!value || !(*value >= low && *value <= high))
+    throw InputError(
+        fmt::format("{}: '{}' is out of range: must be a number from {} to {}", option, text, low, high));
+  return *value;
+}
+
+int jobs_of(const std::string& text) { return whole_of("--jobs", text, 1, 1024); }
+
+std::uint64_t seed_of(std::string_view option, const std::string& text) {
   std::uint64_t seed = 0;
-  try {
-    if (!text.empty() && text[0] >= '0' && text[0] <= '9') seed = std::stoull(text, &used);
-  } catch (const std::exception&) {
-    used = 0;
-  }
-  if (used == 0 || used != text.size())
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+  if (error != std::errc{} || end != text.data() + text.size())
     throw InputError(fmt::format(
         "{}: '{}' is not a seed: must be a whole number from 0 to 18446744073709551615", option, text));
   return seed;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace roborun::input {
@@ -13,9 +14,15 @@ namespace roborun::input {
 [[nodiscard]] std::vector<std::string> split(const std::string& text);
 /// Nothing if the text is anything but a whole number from `low` to `high`.
 [[nodiscard]] std::optional<int> whole_number(const std::string& text, int low, int high);
+/// Nothing if the text is anything but a finite number.
+[[nodiscard]] std::optional<double> number(const std::string& text);
+/// Throws for anything but a whole number from `low` to `high`.
+[[nodiscard]] int whole_of(std::string_view option, const std::string& text, int low, int high);
+/// Throws for anything but a number from `low` to `high`.
+[[nodiscard]] double number_of(std::string_view option, const std::string& text, double low, double high);
 /// Throws.
 [[nodiscard]] int jobs_of(const std::string& text);
 /// Throws.
-[[nodiscard]] std::uint64_t seed_of(const char* option, const std::string& text);
+[[nodiscard]] std::uint64_t seed_of(std::string_view option, const std::string& text);
 
 }  // namespace roborun::input

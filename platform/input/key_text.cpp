@@ -10,7 +10,7 @@ namespace roborun::input {
 
 std::string_view unit_of(std::string_view key) {
   // Longer suffixes before those that they end in.
-  constexpr std::array<std::pair<std::string_view, std::string_view>, 26> kUnits{{
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 27> kUnits{{
       {"_quadratic_s2pm", "s2/m"},
       {"quadratic_Ns2pm2", "N s2/m2"},
       {"linear_Nspm", "N s/m"},
@@ -20,6 +20,7 @@ std::string_view unit_of(std::string_view key) {
       {"_mps3", "m/s3"},
       {"_mps2", "m/s2"},
       {"_mps", "m/s"},
+      {"_mmph", "mm/h"},
       {"_s2pm", "s2/m"},
       {"_m3", "m3"},
       {"_per_m", "1/m"},

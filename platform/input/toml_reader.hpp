@@ -17,8 +17,24 @@
 
 namespace roborun::input {
 
+/// The library limits how deep brackets nest, but not how many parts a dotted key has: each is a table in a
+/// table, and freed recursively. Throws InputError.
+inline void check_key_parts(const std::string& path, std::string_view text) {
+  constexpr int kMost = 32;
+  constexpr std::string_view kBetweenKeys = "\n,=[]{}#";
+  int line = 1;
+  int dots = 0;
+  for (const char c : text) {
+    if (c == '\n') ++line;
+    if (kBetweenKeys.find(c) != std::string_view::npos) dots = 0;
+    if (c == '.' && ++dots > kMost)
+      throw InputError(fmt::format("{}:{}: not valid TOML: a key of more than {} parts", path, line, kMost));
+  }
+}
+
 /// Throws InputError with file and line if the text is not TOML.
 [[nodiscard]] inline toml::table parse_toml(const std::string& path, std::string_view text) {
+  check_key_parts(path, text);
   try {
     return toml::parse(text, path);
   } catch (const toml::parse_error& error) {
@@ -60,6 +76,13 @@ class TomlReader {
     const auto value = node.is_integer() || node.is_floating_point() ? node.value<double>() : std::nullopt;
     if (!value || !(*value >= low && *value <= high))
       refuse(node, key, fmt::format("must be a number from {} to {}", low, high));
+    return *value;
+  }
+  /// A whole number within [low, high]; 96.0 is one, 96.5 is not.
+  double whole(const toml::node& node, std::string_view key, double low, double high) const {
+    const auto value = node.is_integer() || node.is_floating_point() ? node.value<double>() : std::nullopt;
+    if (!value || !(*value >= low && *value <= high) || *value != std::floor(*value))
+      refuse(node, key, fmt::format("must be a whole number from {} to {}", low, high));
     return *value;
   }
   double number_or(const toml::table& table, std::string_view key, double fallback) const {

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdlib>
@@ -18,8 +19,11 @@
 #include "platform/flight/watchdog_program.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/mission/flight_setup.hpp"
+#include "platform/report/build_identity.hpp"
+#include "platform/report/sha256.hpp"
 #include "platform/rt/host_identity.hpp"
 #include "platform/rt/idle_latency.hpp"
+#include "platform/rt/interference.hpp"
 #include "platform/rt/lane_set.hpp"
 #include "platform/rt/memory_lock.hpp"
 #include "platform/rt/service_notifier.hpp"
@@ -67,6 +71,100 @@ class Injected final : public core::LaneProgram {
   const std::optional<Injection>& fault_;
   const std::atomic<bool>& over_;
   std::uint64_t run_{0};
+};
+
+/// Notes what goes into a lane's frames, and keeps it for the frame in which each slot took longest.
+class Noted final : public core::LaneProgram {
+ public:
+  /// `decisions`: of the decision lane, which alone writes it.
+  Noted(core::LaneProgram& program, std::atomic<std::uint64_t>& decisions,
+        const flight::DecisionProgram* decides, const sitl::SimulatedAircraft* flies)
+      : program_(program), decisions_(decisions), decides_(decides), flies_(flies) {}
+  void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override {
+    if (lane.frame() != frame_) keep(lane);
+    frame_ = lane.frame();
+    program_.run(slot, lane);
+    if (slot == core::SlotId::kGather && decides_ != nullptr)
+      decisions_.store(decides_->decisions(), std::memory_order_relaxed);
+    if (slot == core::SlotId::kWorld && flies_ != nullptr) {
+      p_WB_ = flies_->vehicle().state().p_WB;
+      speed_mps_ = flies_->vehicle().state().v_WB.norm();
+    }
+    decision_ = decisions_.load(std::memory_order_relaxed);
+  }
+  /// What is known of the frame that has ended: also to be called after the last one.
+  void keep(const core::LaneExecutive& lane) noexcept {
+    for (const core::SlotSpec& spec : core::kFrameTable) {
+      if (spec.lane != lane.id()) continue;
+      const core::SlotStatistics& s = lane.statistics(spec.id);
+      if (s.time.count() == 0 || s.longest.frame != frame_) continue;
+      report::WorstFrame& worst = worst_[static_cast<std::size_t>(spec.id)];
+      worst.known = true;
+      worst.decision = decision_;
+      worst.p_WB = {p_WB_.x(), p_WB_.y(), p_WB_.z()};
+      worst.speed_mps = speed_mps_;
+    }
+  }
+  [[nodiscard]] const report::WorstFrame& worst(core::SlotId slot) const noexcept {
+    return worst_[static_cast<std::size_t>(slot)];
+  }
+
+ private:
+  core::LaneProgram& program_;
+  std::atomic<std::uint64_t>& decisions_;
+  const flight::DecisionProgram* decides_;
+  const sitl::SimulatedAircraft* flies_;
+  std::uint64_t frame_{0};
+  std::uint64_t decision_{0};
+  Vector3 p_WB_ = Vector3::Zero();
+  double speed_mps_{0.0};
+  std::array<report::WorstFrame, core::kSlotCount> worst_{};
+};
+
+/// What the lanes traced: the worst of each stretch of time, and all of it where that is wanted. All memory is taken at
+/// the construction.
+class Evidence {
+ public:
+  explicit Evidence(const RealTimeConfig& config) : seconds_(config.seconds), keeps_(config.trace) {
+    fresh_.reserve(core::kLaneCount * 8192);
+    if (keeps_) all_.reserve(traced_bytes(config) / sizeof(core::TraceEvent));
+    for (auto& lane : line_) lane.resize(report::kTimeColumns);
+  }
+  void take(rt::LaneSet& lanes, MonotonicTime begin) {
+    fresh_.clear();
+    lanes.drain_trace(fresh_);
+    for (const core::TraceEvent& e : fresh_) {
+      if (e.is_frame) add(e, begin);
+      if (!keeps_) continue;
+      if (all_.size() < all_.capacity())
+        all_.push_back(e);
+      else
+        ++no_room_;
+    }
+  }
+  [[nodiscard]] const std::vector<report::TimeColumn>& line(core::LaneId id) const {
+    return line_[static_cast<std::size_t>(id)];
+  }
+  [[nodiscard]] std::uint64_t no_room() const noexcept { return no_room_; }
+  [[nodiscard]] std::vector<core::TraceEvent> all() && { return std::move(all_); }
+
+ private:
+  void add(const core::TraceEvent& e, MonotonicTime begin) {
+    const double share = roborun::seconds(e.release - begin) / seconds_;
+    const auto last = static_cast<double>(report::kTimeColumns - 1);
+    const auto at =
+        static_cast<std::size_t>(std::clamp(share * static_cast<double>(report::kTimeColumns), 0.0, last));
+    report::TimeColumn& column = line_[static_cast<std::size_t>(e.lane)][at];
+    column.worst_jitter_us = std::max(column.worst_jitter_us, 1e6 * roborun::seconds(e.begin - e.release));
+    column.worst_response_us = std::max(column.worst_response_us, 1e6 * roborun::seconds(e.end - e.release));
+    ++column.frames;
+    column.misses += e.overrun ? 1U : 0U;
+  }
+  double seconds_;
+  bool keeps_;
+  std::vector<core::TraceEvent> fresh_, all_;
+  std::uint64_t no_room_{0};
+  std::array<std::vector<report::TimeColumn>, core::kLaneCount> line_;
 };
 
 /// stress-ng on all CPUs for as long as it lives.
@@ -122,7 +220,7 @@ rt::LaneSetConfig lane_config(const RealTimeConfig& config) {
   lanes.minor_frame = config.mission.flight.minor_frame;
   lanes.seal = config.seal;
   lanes.best_effort = config.best_effort;
-  lanes.trace = config.trace;
+  lanes.trace = true;
   if (config.mission.backends == board::BackendNames{} && config.mission.own.empty())
     lanes.unneeded_libraries = kBaselineLibraries;
   return lanes;
@@ -136,6 +234,7 @@ class RealTimeRun {
 
  private:
   void fly(const std::function<void(double)>& progress, report::AuditReport& report);
+  [[nodiscard]] std::vector<int> lane_cpus() const;
   void start();
   void stop();
   void fill_lanes(report::AuditReport& report) const;
@@ -143,6 +242,7 @@ class RealTimeRun {
   void fill_commands(report::AuditReport& report) const;
   void fill_kill_switch(report::AuditReport& report) const;
   void fill_flight(report::AuditReport& report);
+  void fill_identity(report::AuditReport& report, const rt::IdleLatencyHold& idle) const;
 
   const RealTimeConfig& config_;
   flight::FlightConfig flight_config_;
@@ -158,9 +258,12 @@ class RealTimeRun {
   core::Reactions reactions_;
   flight::WatchdogProgram watchdog_;
   std::atomic<bool> over_{false};  ///< Whatever was measured is measured.
+  std::atomic<std::uint64_t> decisions_{0};
   std::array<Injected, core::kLaneCount> program_;
+  std::array<Noted, core::kLaneCount> noted_;
   rt::LaneSet lanes_;
-  std::vector<core::SlotEvent> trace_;
+  Evidence evidence_;
+  MonotonicTime first_release_{};
 };
 
 RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
@@ -178,9 +281,14 @@ RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
       program_{Injected{system_.flight_program(), config.inject, over_},
                Injected{system_.decision_program(), config.inject, over_},
                Injected{cameras_, config.inject, over_}, Injected{watchdog_, config.inject, over_}},
-      lanes_(lane_config(config), clock_, reactions_,
-             {&program_[0], &program_[1], &program_[2], &program_[3]}) {
+      noted_{Noted{program_[0], decisions_, nullptr, &aircraft_},
+             Noted{program_[1], decisions_, &system_.decision_program(), nullptr},
+             Noted{program_[2], decisions_, nullptr, nullptr},
+             Noted{program_[3], decisions_, nullptr, nullptr}},
+      lanes_(lane_config(config), clock_, reactions_, {&noted_[0], &noted_[1], &noted_[2], &noted_[3]}),
+      evidence_(config) {
   setup_.check();
+  aircraft_.stand_in(world);
   meter_.attach(lanes_.lane(core::LaneId::kDecision));
   watchdog_.watch(lanes_.lane(core::LaneId::kFlight), lanes_.lane(core::LaneId::kDecision));
 }
@@ -189,11 +297,19 @@ void RealTimeRun::start() {
   if (const std::string why = lanes_.prepare(); !why.empty())
     throw InputError(fmt::format("cannot run in real time: {} (--best-effort runs on without)", why));
   // Whole frames of simulated time from its own start, so that both clocks show the same.
-  aircraft_.start(lanes_.choose_first_release() - flight_config_.minor_frame);
+  first_release_ = lanes_.choose_first_release();
+  aircraft_.start(first_release_ - flight_config_.minor_frame);
   const std::string error = lanes_.start();
   if (error.empty()) return;
   stop();
   throw InputError(error);
+}
+
+std::vector<int> RealTimeRun::lane_cpus() const {
+  std::vector<int> cpus;
+  cpus.reserve(core::kLaneCount);
+  for (const core::LaneSpec& spec : core::kLanes) cpus.push_back(lanes_.placement(spec.id).cpu);
+  return cpus;
 }
 
 void RealTimeRun::stop() {
@@ -213,6 +329,8 @@ void RealTimeRun::fill_lanes(report::AuditReport& report) const {
     l.frames = s.frames;
     l.slips = s.slips;
     l.deadline_misses = s.deadline_misses;
+    l.period_us = 1e6 * seconds(spec.period == core::kMinorFrame ? flight_config_.minor_frame : spec.period);
+    l.time_line = evidence_.line(spec.id);
     l.jitter = report::summarise(s.jitter);
     l.overhead = report::summarise(s.overhead);
     l.response = report::summarise(s.response);
@@ -241,7 +359,9 @@ void RealTimeRun::fill_slots(report::AuditReport& report) const {
     a.overruns = s.overruns;
     a.reactions = s.reactions;
     a.skipped = s.skipped;
-    a.longest = s.longest;
+    a.longest = noted_[static_cast<std::size_t>(spec.lane)].worst(spec.id);
+    a.longest.cause = s.longest;
+    a.longest.seed = config_.mission.seed;
     a.block_frames = s.maxima.block_length();
     std::vector<double> maxima_us;
     for (std::size_t i = 0; i < s.maxima.count(); ++i)
@@ -286,18 +406,26 @@ void RealTimeRun::fly(const std::function<void(double)>& progress, report::Audit
   rt::ServiceNotifier service;
   (void)service.tell("READY=1");
   report.locked_bytes = rt::locked_bytes();
+  rt::InterferenceWatch others(lane_cpus());
   double told_s = 0.0;
   while (report.seconds < config_.seconds && !reactions_.stopping()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     report.seconds = passed_s();
-    lanes_.drain_trace(trace_);
+    evidence_.take(lanes_, first_release_);
     if (!lanes_.lane(core::LaneId::kFlight).overdue(clock_.now())) (void)service.tell("WATCHDOG=1");
-    if (progress && report.seconds >= told_s + 1.0) progress(told_s = report.seconds);
+    if (report.seconds < told_s + 1.0) continue;
+    told_s = report.seconds;
+    others.sample();
+    if (progress) progress(told_s);
   }
+  for (rt::Disturbance& d : others.finish())
+    report.interference.push_back({std::move(d.name), std::move(d.unit), d.total, d.worst_second});
   stop();
   report.seconds = passed_s();
   report.heap_calls_after_start = rt::sealed_heap_calls() - heap_before;
-  lanes_.drain_trace(trace_);
+  evidence_.take(lanes_, first_release_);
+  report.events_lost = lanes_.events_lost() + evidence_.no_room();
+  for (std::size_t i = 0; i < core::kLaneCount; ++i) noted_[i].keep(lanes_.lane(core::kLanes[i].id));
 }
 
 void RealTimeRun::fill_flight(report::AuditReport& report) {
@@ -311,6 +439,43 @@ void RealTimeRun::fill_flight(report::AuditReport& report) {
   report.speed_mps = aircraft_.vehicle().state().v_WB.norm();
   report.flown_m = (aircraft_.vehicle().state().p_WB - start_W_).norm();
   if (reactions_.stopping()) report.stopped_by = core::slot(reactions_.stopped_by()).name;
+}
+
+void RealTimeRun::fill_identity(report::AuditReport& report, const rt::IdleLatencyHold& idle) const {
+  const rt::HostIdentity id = rt::identify_host();
+  const report::BuildIdentity build = report::build_identity();
+  std::string real_time = report.missing.empty() ? "yes" : "no";
+  for (const std::string& why : report.missing) real_time += "; " + why;
+  report.identity = {
+      {"program", "roborun 0.1.0"},
+      {"commit", std::string(build.commit)},
+      {"program_digest", "sha256 " + report::sha256_of_file("/proc/self/exe")},
+      {"compiler", std::string(build.compiler)},
+      {"flags", std::string(build.flags)},
+      {"rate_Hz", fmt::format("{:g}", report.rate_Hz)},
+      {"asked_seconds", fmt::format("{:g}", config_.seconds)},
+      {"seed", fmt::format("{}", config_.mission.seed)},
+      {"load", config_.load ? "stress-ng on all CPUs" : "none"},
+      {"bus", config_.can ? (*config_.can)[0] + " to " + (*config_.can)[1] : "simulated"},
+      {"kill_lines",
+       config_.kill ? (*config_.kill)[0].name + " and " + (*config_.kill)[1].name : "simulated"},
+      {"injected", config_.inject ? fmt::format("{} for {:g} ms", core::slot(config_.inject->slot).name,
+                                                1e3 * seconds(config_.inject->spin))
+                                  : "nothing"},
+      {"real_time", real_time},
+      {"host", id.host},
+      {"kernel", id.kernel},
+      {"preempt_rt", id.preempt_rt ? "yes" : "no"},
+      {"cpu", id.cpu},
+      {"cpus", fmt::format("{}", id.cpus)},
+      {"microcode", id.microcode},
+      {"firmware", id.firmware},
+      {"governor", id.governor},
+      {"frequency", id.frequency},
+      {"isolated", id.isolated},
+      {"nohz_full", id.nohz_full},
+      {"idle_latency", idle.describe()},
+      {"sched_rt_runtime_us", id.rt_runtime}};
 }
 
 report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress) {
@@ -332,26 +497,20 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
   if (motor_bus_) fill_commands(report);
   if (kill_lines_) fill_kill_switch(report);
   report.pools = setup_.pools();
-  const rt::HostIdentity id = rt::identify_host();
-  report.identity = {{"program", "roborun 0.1.0"},
-                     {"build", id.build},
-                     {"kernel", id.kernel},
-                     {"preempt_rt", id.preempt_rt ? "yes" : "no"},
-                     {"cpu", id.cpu},
-                     {"cpus", fmt::format("{}", id.cpus)},
-                     {"governor", id.governor},
-                     {"isolated", id.isolated},
-                     {"idle_latency", idle.describe()},
-                     {"sched_rt_runtime_us", id.rt_runtime}};
-  for (const core::SlotEvent& e : trace_) {
-    report.trace.push_back({static_cast<std::size_t>(e.slot), e.frame,
-                            1e-3 * static_cast<double>(e.begin.time_since_epoch().count()),
-                            1e-3 * static_cast<double>(e.spent.count()), e.overrun});
-  }
+  fill_identity(report, idle);
+  report.trace = std::move(evidence_).all();
   return report;
 }
 
 }  // namespace
+
+std::size_t traced_bytes(const RealTimeConfig& config) {
+  // Events a second: a frame and five slots of the flight lane, two and a half of the decision lane's frame, which
+  // mostly has one slot, and those of background and watchdog. What does not fit is counted as lost.
+  const double rate_Hz = 1.0 / seconds(config.mission.flight.minor_frame);
+  return static_cast<std::size_t>((config.seconds + 2.0) * (9.0 * rate_Hz + 500.0)) *
+         sizeof(core::TraceEvent);
+}
 
 report::AuditReport run_real_time(const sitl::World& world, const RealTimeConfig& config,
                                   const std::function<void(double)>& progress) {

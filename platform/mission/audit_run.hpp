@@ -29,13 +29,17 @@ struct RealTimeConfig {
   double seconds{60.0};
   bool best_effort{false};  ///< Run without what is missing, and say so in the report.
   rt::HeapSeal seal{rt::HeapSeal::kCount};
-  bool load{false};  ///< stress-ng on all CPUs meanwhile.
-  bool trace{false};
+  bool load{false};   ///< stress-ng on all CPUs meanwhile.
+  bool trace{false};  ///< Keep every frame and slot: traced_bytes(), at most kMostTraced_bytes.
   std::optional<Injection> inject{};
   /// CAN interfaces of the kernel for the motors' bus: the vehicle's and the ESCs' (KernelMotorBus).
   std::optional<std::array<std::string, 2>> can{};
   std::optional<gpio::KillWiring> kill{};  ///< A kill switch on lines of the kernel.
 };
+
+/// Memory for a trace is taken before the flight.
+inline constexpr std::size_t kMostTraced_bytes = std::size_t{1} << 30U;
+[[nodiscard]] std::size_t traced_bytes(const RealTimeConfig& config);
 
 /// Takes off in `world` and flies on towards its goal for so many seconds, hovering once it is there. Throws
 /// InputError if this machine cannot run it in real time (one line that names all that is missing) and

@@ -1,5 +1,9 @@
 #include "platform/mission/flight_setup.hpp"
 
+#include <fmt/format.h>
+
+#include <map>
+
 #include "platform/input/input_error.hpp"
 
 namespace roborun::mission {
@@ -17,9 +21,14 @@ void FlightSetup::check() const {
 }
 
 std::vector<report::PoolUse> FlightSetup::pools() const {
+  std::map<std::string, int> of_name;
+  for (const core::PoolRecord& p : arena_.plan()) ++of_name[p.name];
   std::vector<report::PoolUse> pools;
-  for (const core::PoolRecord& p : arena_.plan())
-    pools.push_back({p.name, p.element_bytes, p.count, p.high_water, p.tells_use});
+  std::map<std::string, int> number;
+  for (const core::PoolRecord& p : arena_.plan()) {
+    const std::string name = of_name[p.name] == 1 ? p.name : fmt::format("{} {}", p.name, ++number[p.name]);
+    pools.push_back({name, p.element_bytes, p.count, p.high_water, p.tells_use});
+  }
   return pools;
 }
 

@@ -24,7 +24,7 @@ class FlightSetup {
   [[nodiscard]] core::Arena& arena() noexcept { return arena_; }
   /// To be asked once the flight system stands. Throws InputError if the arena was too small.
   void check() const;
-  /// The memory plan, with what was used so far.
+  /// The memory plan, with what was used so far. Pools of one name are numbered.
   [[nodiscard]] std::vector<report::PoolUse> pools() const;
 
  private:

@@ -9,12 +9,14 @@
 #include <vector>
 
 #include "core/record/state_hash.hpp"
+#include "platform/board/plugin_loader.hpp"
 #include "platform/flight/lockstep_flight.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/mission/flight_setup.hpp"
 #include "platform/mission/mission_faults.hpp"
 #include "platform/mission/mission_judge.hpp"
 #include "platform/mission/recording.hpp"
+#include "platform/mission/work_check.hpp"
 #include "platform/sitl/aircraft/camera_rig.hpp"
 
 namespace roborun::mission {
@@ -27,6 +29,13 @@ double quantile(std::vector<double> values, double q) {
   std::sort(values.begin(), values.end());
   const double at = q * static_cast<double>(values.size() - 1);
   return values[static_cast<std::size_t>(std::ceil(at))];
+}
+
+std::vector<core::CostProfile> prices_of(const MissionConfig& config) {
+  std::vector<core::CostProfile> prices{config.flight.costs};
+  for (core::StageCost& cost : prices.front().stage) cost = core::slower(cost, 1.0 / config.host_factor);
+  if (config.host_costs) prices.push_back(*config.host_costs);
+  return prices;
 }
 
 /// Start and goal must be inside the fence, with room.
@@ -50,6 +59,8 @@ class MissionRun {
  private:
   [[nodiscard]] flight::FlightParts parts();
   void begin_faults();
+  /// Throws InputError for a planner of somebody else's that does not say what it does.
+  void refuse_silence() const;
   void record_decision(const flight::DecisionOutput& out);
   void record_failsafe();
   void summarise(double wall_s);
@@ -63,6 +74,9 @@ class MissionRun {
   std::vector<firmware_if::DepthCamera*> cameras_;
   std::unique_ptr<FlightRecorder> recorder_;  ///< Null: nothing is recorded.
   FlightSetup setup_;
+  std::vector<core::CostProfile> prices_;  ///< Those flown, and those of this machine if they are known.
+  TimedMap timed_map_;
+  TimedPlanner timed_planner_;
   FaultyPlanner planner_;
   flight::LockstepFlight flight_;
   flight::FlightSystem& system_;
@@ -86,21 +100,33 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
                     : std::make_unique<FlightRecorder>(config.record, flight_config_, config, aircraft_,
                                                        cameras_, rig_.lidars())),
       setup_(flight_config_, config.backends, image_limits(config), config.own),
-      planner_(setup_.parts().planner, faults_.line()),
+      prices_(prices_of(config)),
+      timed_map_(setup_.parts().map, prices_),
+      timed_planner_(setup_.parts().planner, prices_),
+      planner_(timed_planner_, faults_.line()),
       flight_(flight_config_, recorder_ ? recorder_->aircraft() : aircraft_,
               recorder_ ? recorder_->cameras() : std::span<firmware_if::DepthCamera* const>(cameras_),
               parts(), setup_.arena(), recorder_ ? recorder_->lidars() : rig_.lidars()),
       system_(flight_.system()),
       judge_(config.judge, flight_config_.fence, flight_config_.vehicle.radius_m, world, aircraft_, system_) {
   setup_.check();
+  aircraft_.stand_in(world);
   if (!faults_.empty()) aircraft_.connect(faults_.line());
   if (!config.flight.answers) aircraft_.ignore_kill_switch();
 }
 
 flight::FlightParts MissionRun::parts() {
-  flight::FlightParts parts = setup_.parts();
-  if (faults_.empty()) return parts;
-  return {parts.map, planner_, parts.policy};
+  if (faults_.empty()) return {timed_map_, timed_planner_, setup_.parts().policy};
+  return {timed_map_, planner_, setup_.parts().policy};
+}
+
+void MissionRun::refuse_silence() const {
+  const bool shipped = !config_.own.planner && !board::is_plugin(config_.backends.planner);
+  if (shipped || !timed_planner_.work().silent) return;
+  throw InputError(fmt::format(
+      "--planner: {}: planned a path, and said that it did no work for which the profile {} charges: "
+      "must count work.units and work.volume_m3 (stages/planning/planner.hpp)",
+      config_.own.planner ? kCustom : config_.backends.planner, config_.profile_name));
 }
 
 /// Those that begin with the next minor frame.
@@ -210,8 +236,11 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
     const Vector3 before_W = aircraft_.vehicle().state().p_WB;
     begin_faults();
     const MonotonicTime now = flight_.now() + config_.flight.minor_frame;
-    if (const flight::DecisionOutput* decision = flight_.step(faults_.computer(now)))
+    if (const flight::DecisionOutput* decision = flight_.step(faults_.computer(now))) {
       record_decision(*decision);
+      if (recorder_) recorder_->check();
+    }
+    refuse_silence();
     const sitl::VehicleState& s = aircraft_.vehicle().state();
     report_.result.distance_m += (s.p_WB - before_W).norm();
     report_.result.max_velocity_mps = std::max(report_.result.max_velocity_mps, s.v_WB.norm());
@@ -233,6 +262,7 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
   report_.result.reached_goal = report_.result.reason == "reached_goal";
   report_.result.collided = judge_.collided();
   report_.pools = setup_.pools();
+  report_.work = work_of(timed_map_, timed_planner_);
   record_failsafe();
   summarise(std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count());
   return std::move(report_);

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "platform/input/input_error.hpp"
 #include "platform/sitl/sensors/lidar.hpp"
 
@@ -17,6 +20,27 @@ governor::Design design_of(const char* option, const std::string& name) {
       name));
 }
 
+namespace {
+
+/// The vehicle must have room where it stands, on its way up to the start, and at the goal.
+void check_room(const sitl::World& world, double radius_m) {
+  const auto check = [&](const char* name, const Vector3& p_W) {
+    if (world.clearance_m(p_W, radius_m) < radius_m)
+      throw InputError(
+          fmt::format("{}: ({:.2f}, {:.2f}, {:.2f}) is closer than the vehicle's radius of {} m to an "
+                      "obstacle: must be free",
+                      name, p_W.x(), p_W.y(), p_W.z(), radius_m));
+  };
+  check("start", world.start_W());
+  check("goal", world.goal_W());
+  const Vector3 ground_W = ground_below(world);
+  const Vector3 climb_W = world.start_W() - ground_W;
+  const int steps = static_cast<int>(std::ceil(climb_W.norm() / radius_m));
+  for (int i = 0; i < steps; ++i) check("below the start", ground_W + climb_W * i / steps);
+}
+
+}  // namespace
+
 flight::FlightConfig flight_config_of(const sitl::World& world, const MissionConfig& config) {
   flight::FlightConfig flight = config.flight;
   flight.bounds_W = world.bounds_W();
@@ -30,6 +54,7 @@ flight::FlightConfig flight_config_of(const sitl::World& world, const MissionCon
     throw InputError(fmt::format("{} {}: {}: must be from {} to {}: {}", fault->sensor, fault->index + 1,
                                  fault->key, fault->low, fault->high, fault->text));
   describe_sensors(rig, flight);
+  check_room(world, flight.vehicle.radius_m);
   flight.seed = config.seed;
   return flight;
 }
@@ -37,6 +62,8 @@ flight::FlightConfig flight_config_of(const sitl::World& world, const MissionCon
 void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle) {
   config.flight.vehicle = vehicle.model;
   config.simulator.rig = vehicle.rig;
+  config.simulator.sensors.imu = vehicle.rig.imu;
+  config.simulator.sensors.gnss = vehicle.rig.gnss;
   config.simulator.lidar_patterns.clear();
   for (std::size_t i = 0; i < vehicle.rig.lidars.size(); ++i) {
     auto& pattern = config.simulator.lidar_patterns.emplace_back();
@@ -46,7 +73,10 @@ void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle) {
   }
 }
 
-Vector3 ground_below(const sitl::World& world) { return {world.start_W().x(), world.start_W().y(), 0.0}; }
+Vector3 ground_below(const sitl::World& world) {
+  const Vector3& start_W = world.start_W();
+  return {start_W.x(), start_W.y(), world.ground_below_m(start_W)};
+}
 
 board::ImageLimits image_limits(const MissionConfig& config) {
   return board::image_limits(sitl::rig_of(config.simulator), config.flight.vehicle);

@@ -57,6 +57,10 @@ struct MissionConfig {
   board::BackendNames backends{};
   board::OwnParts own{};  ///< In the place of backends and governor; such a flight is not recorded.
   sitl::SimulatorConfig simulator{};
+  /// What the stages cost on the machine that simulates, if that is known: a second price, beside flight.costs,
+  /// of the work that map and planner say they did (work_check.hpp).
+  std::optional<core::CostProfile> host_costs{};
+  double host_factor{1.0};  ///< flight.costs are so many times those of the machine that was measured.
   SlowDown slow_down{};
   JudgeConfig judge{};
   std::vector<TimedFault> faults{};  ///< At most sitl::FaultLine::kMost.
@@ -66,11 +70,12 @@ struct MissionConfig {
 };
 
 /// The flight through `world`: its bounds, its goal, the height of its start, and the rest from `config`.
-/// Throws InputError for a rig that cannot be.
+/// Throws InputError for a rig that cannot be, and for a vehicle that has no room at the goal, the start or
+/// on the way up to it.
 [[nodiscard]] flight::FlightConfig flight_config_of(const sitl::World& world, const MissionConfig& config);
 /// This vehicle flies the mission.
 void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle);
-/// Where the vehicle stands before the flight.
+/// Where the vehicle stands before the flight: on the first surface below the start.
 [[nodiscard]] Vector3 ground_below(const sitl::World& world);
 /// Of the images that the map will get.
 [[nodiscard]] board::ImageLimits image_limits(const MissionConfig& config);

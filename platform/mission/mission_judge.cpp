@@ -12,6 +12,8 @@ constexpr double kOwnApproach_mps = 0.3;  // less is swaying on the spot
 constexpr double kHolding_s = 5.0;        // of hovering, until a hold counts as the end
 constexpr double kHardTouchdown_mps = 2.0;
 constexpr double kMoved_m = 5.0;  // a way around may lead away from the goal
+constexpr double kOffGround_m = 0.5;     // higher than this over what it stood on: it has left it
+constexpr double kUneven_m = 0.3;        // how much ground may rise around where it stands
 constexpr double kGiveUpAfter_s = 60.0;  // what cannot even stop
 
 }  // namespace
@@ -23,7 +25,8 @@ void MissionJudge::watch(MonotonicTime now) {
     if (ratio > 0.0) safety_.last_thrust_s = seconds(now.time_since_epoch());
   }
   if (!fence_.allows_over_ground({s.p_WB, s.p_WB})) safety_.left_fence = true;
-  left_ground_ = left_ground_ || (system_.control().airborne() && s.p_WB.z() > 0.5);
+  left_ground_ = left_ground_ ||
+                 (system_.control().airborne() && s.p_WB.z() > aircraft_.vehicle().ground_m() + kOffGround_m);
   if (s.on_ground && sink_mps_ > 0.0) safety_.touchdown_mps = sink_mps_;
   sink_mps_ = s.on_ground ? 0.0 : -s.v_WB.z();
 }
@@ -54,11 +57,15 @@ const char* MissionJudge::judge(MonotonicTime now) {
   const double to_goal_m = (world_.goal_W() - s.p_WB).norm();
   const governor::Action action = system_.pilot().action();
   watch(now);
-  // The vehicle's body, a sphere of half its span; the ground counts once it has left it, unless it lands.
-  const bool down = left_ground_ && s.p_WB.z() < 0.3 && !system_.control().descending();
+  // The vehicle's body, a sphere of half its span; the ground counts once it has left it, unless it lands. What it
+  // stands on may be an obstacle of the world, a floor: until then the sphere is looked at above it.
+  const bool stands = !left_ground_ || system_.control().descending();
+  const bool down = !stands && s.p_WB.z() < world_.ground_m() + kUneven_m;
+  Vector3 body_W = s.p_WB;
+  if (stands) body_W.z() = std::max(body_W.z(), aircraft_.vehicle().ground_m() + radius_m_ + kUneven_m);
   const bool hard = system_.control().descending() && safety_.touchdown_mps > kHardTouchdown_mps;
   const bool motors_off = action >= governor::Action::kTerminate;
-  if (!motors_off && (world_.clearance_m(s.p_WB, radius_m_) < radius_m_ || down || hard)) {
+  if (!motors_off && (world_.clearance_m(body_W, radius_m_) < radius_m_ || down || hard)) {
     collided_ = true;
     return "collision";
   }

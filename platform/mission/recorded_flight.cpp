@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "platform/input/input_error.hpp"
+#include "platform/input/json_reader.hpp"
 
 namespace roborun::mission {
 namespace {
@@ -109,6 +110,7 @@ Json sensors_json(const Sensors& sensors) {
   for (const auto& sensor : sensors) {
     Json one;
     for (const auto& key : keys_of(sensor)) one[key.key] = key.get(sensor);
+    if (sensor.model != decltype(sensor.model){}) one["model"] = to_string(sensor.model);
     list.push_back(std::move(one));
   }
   return list;
@@ -119,6 +121,10 @@ void read_sensors(const Json& list, core::StaticVector<Spec, N>& sensors) {
   for (const Json& one : list) {
     Spec spec;
     for (const SensorKey<Spec>& key : keys_of(spec)) key.set(spec, number(one, key.key, key.low, key.high));
+    using Model = decltype(spec.model);
+    const auto model = model_of<Model>(one.value("model", to_string(Model{})));
+    if (!model) throw InputError("model: no name of a sensor model");
+    spec.model = *model;
     if (!sensors.push_back(spec)) throw InputError(fmt::format("must be at most {} sensors of a kind", N));
   }
 }
@@ -175,8 +181,7 @@ std::string to_json(const RecordedFlight& recorded) {
 }
 
 RecordedFlight recorded_flight_from(std::span<const std::byte> json) {
-  const auto* text = reinterpret_cast<const char*>(json.data());
-  const Json j = Json::parse(text, text + json.size());
+  const Json j = input::parse_json({reinterpret_cast<const char*>(json.data()), json.size()});
   if (j.at("roborun_recording") != kVersion) throw InputError("of another version");
   RecordedFlight recorded;
   flight::FlightConfig& flight = recorded.flight;

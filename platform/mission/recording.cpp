@@ -139,8 +139,7 @@ FlightRecorder::FlightRecorder(const std::string& path, const flight::FlightConf
                                const MissionConfig& config, flight::Aircraft& aircraft,
                                std::span<firmware_if::DepthCamera* const> cameras,
                                std::span<firmware_if::Lidar* const> lidars)
-    : path_(recordable(path, config)), file_(path, std::ios::binary | std::ios::trunc), aircraft_(aircraft) {
-  if (!file_) throw InputError(fmt::format("{}: cannot be written", path));
+    : file_(recordable(path, config)), aircraft_(aircraft) {
   imu_ = std::make_unique<Tap<firmware_if::Imu, firmware_if::ImuSample>>(*this, aircraft.imu());
   gnss_ = std::make_unique<Tap<firmware_if::Gnss, firmware_if::GnssFix>>(*this, aircraft.gnss());
   barometer_ = std::make_unique<Tap<firmware_if::Barometer, firmware_if::BarometerSample>>(
@@ -202,9 +201,9 @@ void FlightRecorder::write(RecordKind kind) noexcept {
   const std::array<std::uint32_t, 2> head{static_cast<std::uint32_t>(kind),
                                           static_cast<std::uint32_t>(payload_.size())};
   checksum_ = checksum(checksum_, kind, payload_);
-  file_.write(reinterpret_cast<const char*>(head.data()), sizeof head);
-  file_.write(reinterpret_cast<const char*>(payload_.data()), static_cast<std::streamsize>(payload_.size()));
-  file_.write(reinterpret_cast<const char*>(&checksum_), sizeof checksum_);
+  file_.write({reinterpret_cast<const char*>(head.data()), sizeof head});
+  file_.write({reinterpret_cast<const char*>(payload_.data()), payload_.size()});
+  file_.write({reinterpret_cast<const char*>(&checksum_), sizeof checksum_});
   payload_.clear();
 }
 
@@ -212,8 +211,7 @@ void FlightRecorder::finish(const stages::OccupancyMap& map) {
   totals_.digest = digest_.value(map);
   each_field(Put(payload_), totals_);
   write(RecordKind::kEnd);
-  file_.close();
-  if (!file_) throw InputError(fmt::format("{}: cannot be written: is the disk full?", path_));
+  file_.commit();
 }
 
 }  // namespace roborun::mission

@@ -8,7 +8,6 @@
 #pragma once
 
 #include <cstdint>
-#include <fstream>
 #include <memory>
 #include <span>
 #include <string>
@@ -19,6 +18,7 @@
 #include "firmware_if/lidar.hpp"
 #include "platform/flight/aircraft.hpp"
 #include "platform/flight/decision_pipeline.hpp"
+#include "platform/input/output_file.hpp"
 #include "platform/mission/mission_config.hpp"
 #include "stages/perception/occupancy_map.hpp"
 
@@ -68,6 +68,9 @@ class FlightRecorder final : private flight::Aircraft {
   [[nodiscard]] std::span<firmware_if::Lidar* const> lidars() noexcept { return lidars_; }
   void decided(const flight::DecisionOutput& decision) noexcept;
   void gave_up() noexcept { write(RecordKind::kGiveUp); }
+  /// Throws InputError if anything could not be written so far.
+  void check() const { file_.check(); }
+  /// Only now the file has its name: without this call the file before stays.
   void finish(const stages::OccupancyMap& map);
 
  private:
@@ -89,8 +92,7 @@ class FlightRecorder final : private flight::Aircraft {
   /// Ends the record that was put together since the one before.
   void write(RecordKind kind) noexcept;
 
-  std::string path_;
-  std::ofstream file_;
+  input::OutputFile file_;
   flight::Aircraft& aircraft_;
   std::vector<std::byte> payload_;
   std::uint64_t checksum_{0};

@@ -31,9 +31,7 @@ constexpr std::array<Size, kRecordKinds> kSizes{{{2, kMostStart},
 
 }  // namespace
 
-Recording::Recording(const std::string& path) : path_(path), file_(path, std::ios::binary) {
-  if (!file_)
-    throw InputError(fmt::format("{}: cannot be opened: must be a file of roborun fly --record", path));
+Recording::Recording(const std::string& path) : path_(path), file_(path, "a file of roborun fly --record") {
   read_record();
   if (!error_.empty()) throw InputError(error_);
   try {
@@ -51,11 +49,18 @@ void Recording::break_off(const std::string& why) {
   payload_.clear();
 }
 
-void Recording::read_record() {
+void Recording::read_record() noexcept {
+  try {
+    try_to_read_record();
+  } catch (const std::exception& error) {  // the file, or memory
+    break_off(error.what());
+  }
+}
+
+void Recording::try_to_read_record() {
   std::array<std::uint32_t, 2> head{};
   const auto read = [this](void* to, std::size_t bytes) {
-    file_.read(static_cast<char*>(to), static_cast<std::streamsize>(bytes));
-    return static_cast<std::size_t>(file_.gcount()) == bytes;
+    return file_.read({static_cast<char*>(to), bytes}) == bytes;
   };
   if (!read(head.data(), sizeof head)) return break_off("cut off: the recording has no end");
   const auto [kind, bytes] = head;
@@ -68,7 +73,8 @@ void Recording::read_record() {
     return break_off("cut off in the middle of a record");
   checksum_ = checksum(checksum_, kind_, payload_);
   if (sum != checksum_) return break_off("damaged: the checksum differs");
-  if (kind_ == RecordKind::kEnd && file_.peek() != std::ifstream::traits_type::eof()) {
+  char more = 0;
+  if (kind_ == RecordKind::kEnd && read(&more, 1)) {
     position_ += sizeof head + bytes + sizeof sum;
     return break_off("something follows the end of the recording");
   }

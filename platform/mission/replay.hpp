@@ -2,12 +2,12 @@
 #pragma once
 
 #include <cstdint>
-#include <fstream>
 #include <functional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "platform/input/input_file.hpp"
 #include "platform/mission/recorded_flight.hpp"
 #include "platform/mission/recording.hpp"
 
@@ -30,11 +30,13 @@ class Recording {
   [[nodiscard]] FlightTotals totals() const noexcept;
 
  private:
-  void read_record();
+  void read_record() noexcept;
+  /// Throws InputError if the file cannot be read.
+  void try_to_read_record();
   void break_off(const std::string& why);
 
   std::string path_;
-  std::ifstream file_;
+  input::InputFile file_;
   std::uint64_t position_{0};
   std::uint64_t checksum_{0};
   RecordKind kind_{};

@@ -93,17 +93,20 @@ void ScenarioReader::read_head(Scenario& s) const {
     reader_.refuse(head, "world", "must be there, or environment, and not both");
   if (world != nullptr)
     s.world = (std::filesystem::path(path_).parent_path() / text(*world, "world")).string();
+  if (world != nullptr) s.files.push_back(s.world);
   if (environment != nullptr) s.environment = text(*environment, "environment");
   if (const toml::node* node = head.get("vehicle")) {
     const std::string name = text(*node, "vehicle");
     const std::vector<std::string> shipped = vehicle::shipped_vehicles();
     const bool ships = std::find(shipped.begin(), shipped.end(), name) != shipped.end();
-    set_vehicle(s.config, vehicle::load_vehicle(
-                              ships ? name : (std::filesystem::path(path_).parent_path() / name).string()));
+    const std::string from = ships ? name : (std::filesystem::path(path_).parent_path() / name).string();
+    const vehicle::Vehicle vehicle = vehicle::load_vehicle(from);
+    set_vehicle(s.config, vehicle);
+    s.files.insert(s.files.end(), vehicle.patterns.begin(), vehicle.patterns.end());
+    s.files.push_back(from);
   }
   if (const toml::node* node = head.get("seed")) {
-    const double seed = number(*node, "seed", 0, 20000);
-    s.config.seed = static_cast<std::uint64_t>(seed);
+    s.config.seed = static_cast<std::uint64_t>(reader_.whole(*node, "seed", 0, 20000));
   }
   if (const toml::node* node = head.get("design")) {
     constexpr std::array<const char*, 3> kDesigns{"aware", "static", "static-fair"};
@@ -143,7 +146,7 @@ void ScenarioReader::read_faults(Scenario& s) const {
     f.fault.component = spec.component;
     f.fault.kind = static_cast<sitl::FaultKind>(of_all - sitl::kFaultKindNames.begin());
     if (const toml::node* instance = fault->get("instance"))
-      f.fault.instance = static_cast<int>(number(*instance, "instance", 0, spec.instances - 1));
+      f.fault.instance = static_cast<int>(reader_.whole(*instance, "instance", 0, spec.instances - 1));
     if (const toml::node* phase = fault->get("phase"))
       f.phase = static_cast<governor::Phase>(
           choice(*phase, "phase", names_of<governor::Phase, governor::kPhaseCount>()));
@@ -169,6 +172,10 @@ void ScenarioReader::read_expectation(Scenario& s) const {
         choice(*node, "condition", names_of<governor::Condition, governor::kConditionCount>())));
   s.expect.within_s = maybe(t, "within_s", 7200);
   s.expect.motors_stop_within_s = maybe(t, "motors_stop_within_s", 7200);
+  for (const char* key : {"within_s", "motors_stop_within_s"}) {
+    if (const toml::node* node = t.get(key); node != nullptr && s.config.faults.empty())
+      reader_.refuse(*node, key, "goes with a [[fault]]: it counts from the first one");
+  }
   s.expect.touchdown_mps = maybe(t, "touchdown_mps", 100);
   s.expect.home_within_m = maybe(t, "home_within_m", 20000);
   if (const toml::node* node = t.get("landing_site_known"))

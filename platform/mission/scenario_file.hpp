@@ -31,6 +31,7 @@ struct Scenario {
   std::vector<sitl::Body> bodies;  ///< Besides those of the world.
   MissionConfig config{};
   Expectation expect{};
+  std::vector<std::string> files;  ///< Read besides its own: world, vehicle and its patterns.
 };
 
 /// Tables [scenario] about, world (relative to this file) or environment, vehicle (shipped, or a file

@@ -39,9 +39,9 @@ struct SettingKey {
 };
 
 // clang-format off
-constexpr std::array<SettingKey, 15> kSettings = [] {
+constexpr std::array<SettingKey, 17> kSettings = [] {
   using C = MissionConfig;
-  return std::array<SettingKey, 15>{{
+  return std::array<SettingKey, 17>{{
     {"camera", "pixels", [](const C& c) { return static_cast<double>(c.simulator.camera.pixels); },
      [](C& c, double v) { c.simulator.camera.pixels = static_cast<std::uint16_t>(v);
                           set_cameras(c, [v](CameraSpec& s) { s.width = s.height = static_cast<std::uint16_t>(v); }); },
@@ -63,6 +63,11 @@ constexpr std::array<SettingKey, 15> kSettings = [] {
      [](C& c, double v) { c.simulator.camera.pixel_dropout_ratio = v; }, 0, 1, false, "pixels that say nothing"},
     {"camera", "frame_dropout_ratio", [](const C& c) { return c.simulator.camera.frame_dropout_ratio; },
      [](C& c, double v) { c.simulator.camera.frame_dropout_ratio = v; }, 0, 1, false, "images that never arrive"},
+    {"camera", "invalid_ratio", [](const C& c) { return c.simulator.camera.invalid_ratio; },
+     [](C& c, double v) { c.simulator.camera.invalid_ratio = v; set_cameras(c, [v](CameraSpec& s) { s.invalid_ratio = v; }); },
+     0, kMostInvalid, false, "pixels without a value on surfaces, in patches; of models but clean"},
+    {"rain", "rate_mmph", [](const C& c) { return c.simulator.lidar.rain_mmph; },
+     [](C& c, double v) { c.simulator.lidar.rain_mmph = v; }, 0, 100, false, "what falls; seen by LiDARs of models but clean"},
     {"wind", "gust_mps", [](const C& c) { return c.simulator.wind.gust_mps; },
      [](C& c, double v) { c.simulator.wind.gust_mps = v; }, 0, 10, false, "one sigma of the gusts along each axis, half of it upwards"},
     {"battery", "capacity_J", [](const C& c) { return c.flight.vehicle.battery_J; },
@@ -82,8 +87,14 @@ constexpr std::array<SettingKey, 15> kSettings = [] {
 // clang-format on
 
 /// Keys that are no single number.
-constexpr std::array<std::pair<const char*, const char*>, 4> kOtherKeys{
-    {{"wind", "mean_mps"}, {"fence", "altitude_m"}, {"fence", "keep_in"}, {"fence", "keep_out"}}};
+constexpr std::array<std::pair<const char*, const char*>, 8> kOtherKeys{{{"camera", "model"},
+                                                                         {"lidar", "model"},
+                                                                         {"imu", "model"},
+                                                                         {"gnss", "model"},
+                                                                         {"wind", "mean_mps"},
+                                                                         {"fence", "altitude_m"},
+                                                                         {"fence", "keep_in"},
+                                                                         {"fence", "keep_out"}}};
 
 std::set<std::string_view> keys_of(std::string_view table) {
   std::set<std::string_view> keys;
@@ -149,6 +160,53 @@ void read_areas(const input::TomlReader& reader, const toml::table& table, const
   }
 }
 
+template <typename Model>
+std::optional<Model> read_model(const input::TomlReader& reader, const toml::table& root, const char* name) {
+  const toml::table* table = section(reader, root, name, keys_of(name));
+  const toml::node* node = table == nullptr ? nullptr : table->get("model");
+  if (node == nullptr) return std::nullopt;
+  const auto model = model_of<Model>(node->value<std::string>().value_or(""));
+  if (!model)
+    reader.refuse(*node, "model",
+                  fmt::format("must be one of \"{}\"", fmt::join(names_of(Model{}), "\", \"")));
+  return model;
+}
+
+void read_models(const input::TomlReader& reader, const toml::table& root, MissionConfig& config) {
+  sitl::SimulatorConfig& simulator = config.simulator;
+  if (const auto model = read_model<CameraModel>(reader, root, "camera")) {
+    simulator.camera.model = *model;
+    set_cameras(config, [model](CameraSpec& s) { s.model = *model; });
+  }
+  if (const auto model = read_model<LidarModel>(reader, root, "lidar")) {
+    if (!simulator.rig || simulator.rig->lidars.empty())
+      reader.refuse(*root.get("lidar"), "lidar", "must not be there: the vehicle has none");
+    for (LidarSpec& lidar : simulator.rig->lidars) lidar.model = *model;
+  }
+  if (const auto model = read_model<ImuModel>(reader, root, "imu")) simulator.sensors.imu = *model;
+  if (const auto model = read_model<GnssModel>(reader, root, "gnss")) simulator.sensors.gnss = *model;
+}
+
+/// Numbers that no sensor of this vehicle takes notice of.
+void refuse_idle(const input::TomlReader& reader, const toml::table& root, const MissionConfig& config) {
+  const SensorRig rig = sitl::rig_of(config.simulator);
+  const auto clean_camera = [](const CameraSpec& c) { return c.model == CameraModel::kClean; };
+  const auto clean_lidar = [](const LidarSpec& l) { return l.model == LidarModel::kClean; };
+  const auto refuse = [&](const char* table, const char* key, const char* what) {
+    const toml::node* node = root.get(table);
+    if (node == nullptr || node->as_table() == nullptr || node->as_table()->get(key) == nullptr) return;
+    reader.refuse(*node->as_table()->get(key), key, what);
+  };
+  if (std::all_of(rig.cameras.begin(), rig.cameras.end(), clean_camera))
+    refuse("camera", "invalid_ratio", "must not be there without a camera of a model other than \"clean\"");
+  if (std::none_of(rig.cameras.begin(), rig.cameras.end(), clean_camera))
+    for (const char* key : {"noise_m", "noise_per_m", "pixel_dropout_ratio"})
+      refuse("camera", key,
+             "must not be there without a camera of the model \"clean\": others have their own");
+  if (std::all_of(rig.lidars.begin(), rig.lidars.end(), clean_lidar))
+    refuse("rain", "rate_mmph", "must not be there without a LiDAR of a model other than \"clean\"");
+}
+
 }  // namespace
 
 void load_settings(const std::string& path, MissionConfig& config) {
@@ -163,10 +221,14 @@ void read_settings(const input::TomlReader& reader, const toml::table& root, Mis
     const toml::table* table = section(reader, root, key.table, keys_of(key.table));
     const toml::node* node = table == nullptr ? nullptr : table->get(key.key);
     if (node == nullptr) continue;
-    const double value = reader.number(*node, key.key, key.low, key.high);
-    if (key.whole && value != std::floor(value)) reader.refuse(*node, key.key, "must be a whole number");
-    key.set(config, value);
+    key.set(config, key.whole ? reader.whole(*node, key.key, key.low, key.high)
+                              : reader.number(*node, key.key, key.low, key.high));
   }
+  if (const toml::table* t = section(reader, root, "cpu", keys_of("cpu")); t != nullptr && t->size() == 1)
+    reader.refuse(t->begin()->second, t->begin()->first.str(),
+                  "goes with the other key of [cpu]: slow_down_at_s and slow_down_factor");
+  read_models(reader, root, config);
+  refuse_idle(reader, root, config);
   if (const toml::table* t = section(reader, root, "wind", keys_of("wind"))) {
     if (const toml::node* mean = t->get("mean_mps")) {
       config.simulator.wind.mean_W_mps = reader.point(*mean, "mean_mps");

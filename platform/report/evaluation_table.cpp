@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/executive/stage_budget.hpp"
+#include "platform/report/sweep_sensitivity.hpp"
 
 namespace roborun::report {
 namespace {
@@ -74,6 +75,9 @@ ZoneTime time_in(const MissionReport& flight, const std::vector<double>& borders
   return t;
 }
 
+/// What RoboRun printed of one mission is of its middle environment: it stands beside no other one.
+bool is_published(const MissionResult& r) { return r.env == "14"; }
+
 std::string zone_table(std::span<const MissionReport> flights, const std::vector<double>& borders_m) {
   constexpr const char* kRow = "{:<12} {:<4} {:>13} {:>8} {:>11}";
   std::string text = fmt::format(fmt::runtime(kRow), "latency, s", "zone", "mean", "longest", "published");
@@ -96,6 +100,7 @@ std::string zone_table(std::span<const MissionReport> flights, const std::vector
       constexpr std::array<const char*, 3> kAware{"up to 10", "0.15", "up to 12.5"};
       std::string printed = design == "static" ? "up to 5.4" : "";
       if (design == "aware" && borders_m.size() == 2) printed = kAware[zone];
+      if (!is_published(flights.front().result)) printed.clear();
       text += fmt::format(fmt::runtime(kRow), design,
                           borders_m.empty() ? "all" : std::string(1, static_cast<char>('A' + zone)),
                           shown(estimate(whole_s), 2), fmt::format("{:.2f}", all.longest_s), printed);
@@ -110,38 +115,29 @@ std::string zone_table(std::span<const MissionReport> flights, const std::vector
 }  // namespace
 
 std::string sensitivity_table(const std::vector<SweepRow>& rows, const std::string& profile) {
-  constexpr const char* kRow = "{:<17} {:<12} {:>14} {:>14} {:>14} {:>14} {:>10}\n";
+  constexpr const char* kRow = "{:<17} {:<12} {:>11} {:>13} {:>13} {:>13} {:>13} {:>10}\n";
   std::string text;
   for (const Knob& knob : kKnobs) {
-    std::set<double> values;
-    for (const SweepRow& row : rows) values.insert(knob.value(row));
-    if (values.size() < 2) continue;
     std::array<std::string, 3> head;
-    for (std::size_t i = 0; const double value : values) {
-      if (i < head.size()) head[i++] = fmt::format("s at {:g}", value);
-    }
-    text += fmt::format(fmt::runtime(kRow), knob.name, "design", head[0], head[1], head[2], "last / first",
-                        "published");
+    for (std::size_t i = 0; i < head.size(); ++i) head.at(i) = fmt::format("s at {:g}", knob.values.at(i));
+    text += fmt::format(fmt::runtime(kRow), knob.name, "design", "missions", head[0], head[1], head[2],
+                        "last / first", "published");
     for (const std::string& design : names_of(rows, design_of)) {
-      std::array<std::string, 3> cell;
-      std::vector<std::vector<const SweepRow*>> at;
-      for (std::size_t i = 0; const double value : values) {
-        std::vector<const SweepRow*> mine;
-        for (const SweepRow& row : rows) {
-          if (row.result.profile == profile && row.result.design == design && !(knob.value(row) < value) &&
-              !(knob.value(row) > value))
-            mine.push_back(&row);
-        }
-        if (i < cell.size()) cell[i++] = shown(estimate(mine, mission_time), 0);
-        at.push_back(std::move(mine));
+      const Sensitivity s = sensitivity_of(rows, profile, design, knob);
+      if (!s.missing.empty()) {
+        text += fmt::format("{:<17} {:<12} not compared; {}\n", "", design, s.missing);
+        continue;
       }
+      std::array<std::string, 3> cell;
+      for (std::size_t i = 0; i < cell.size(); ++i) cell.at(i) = shown(estimate(s.at.at(i), mission_time), 0);
       const auto p = published(design);
-      text += fmt::format(fmt::runtime(kRow), "", design, cell[0], cell[1], cell[2],
-                          shown(time_ratio(at.back(), at.front()), 2),
+      text += fmt::format(fmt::runtime(kRow), "", design,
+                          fmt::format("{} of {}", 3 * s.at.front().size(), s.missions), cell[0], cell[1],
+                          cell[2], shown(time_ratio(s.at.back(), s.at.front()), 2),
                           p ? fmt::format("{:g}", knob.printed_ratio(*p)) : "");
     }
   }
-  return text.empty() ? "one value of each: nothing to compare\n" : text;
+  return text + "missions: those that have a twin at every value of the knob, all else being equal\n";
 }
 
 std::string representative_table(std::span<const MissionReport> flights,
@@ -161,7 +157,7 @@ std::string representative_table(std::span<const MissionReport> flights,
     text += fmt::format(fmt::runtime(kRow), design, fmt::format("{}/{}", reached, mine.size()),
                         shown(estimate(mine, mission_time), 0), shown(estimate(mine, velocity), 2),
                         shown(estimate(mine, energy), 0), shown(estimate(mine, latency), 2));
-    if (design == "static" || design == "aware")
+    if (is_published(mine.front()->result) && (design == "static" || design == "aware"))
       text +=
           fmt::format(fmt::runtime(kRow), "  published", "", "", design == "aware" ? "2.01" : "0.43", "", "");
   }
@@ -171,9 +167,10 @@ std::string representative_table(std::span<const MissionReport> flights,
     const Gain g = gain(rows, profile, "aware", baseline);
     if (g.pairs > 0) text += gain_row(fmt::format("aware against {}", baseline), g);
   }
-  text +=
-      "  published, aware against static: 4.6 velocity, 3.5 shorter, 3 less energy, 11 latency (median)\n\n";
-  return text + zone_table(flights, zone_borders_m);
+  if (!rows.empty() && is_published(rows.front().result))
+    text +=
+        "  published, aware against static: 4.6 velocity, 3.5 shorter, 3 less energy, 11 latency (median)\n";
+  return text + '\n' + zone_table(flights, zone_borders_m);
 }
 
 std::string kernel_table(const std::vector<SweepRow>& rows) {

@@ -12,12 +12,14 @@
 
 namespace roborun::report {
 
-/// Mission time at each value of density, spread and distance, a row a design of `profile`; the ratio of the
-/// highest knob to the lowest is beside the published one.
+/// Mission time at each value of density, spread and distance, one row per design of `profile`, from missions
+/// in which only that knob differs (sweep_sensitivity.hpp); the ratio of the highest knob to the lowest is
+/// beside the published one. Where the sweep has no such missions the row says which environments are missing.
 [[nodiscard]] std::string sensitivity_table(const std::vector<SweepRow>& rows, const std::string& profile);
 
 /// Flights of one environment and profile, several seeds a design: time, velocity, energy, latency, and what
-/// the decisions in zones A, B and C took: mean by stage, and the longest. The borders are x in metres;
+/// the decisions in zones A, B and C took: mean by stage, and the longest; for environment 14 beside what was
+/// published. The borders are x in metres;
 /// empty: one zone.
 [[nodiscard]] std::string representative_table(std::span<const MissionReport> flights,
                                                const std::vector<double>& zone_borders_m);

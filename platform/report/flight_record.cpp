@@ -3,6 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "platform/input/json_reader.hpp"
+
 namespace roborun::report {
 namespace {
 
@@ -43,7 +45,7 @@ bool from_flight_record(const std::string& text, MissionReport& mission) {
   std::vector<DecisionRecord> decisions;
   const auto finite = [](const Json& json) { return json.is_null() ? 0.0 : json.get<double>(); };
   try {
-    const Json json = Json::parse(text);
+    const Json json = input::parse_json(text);
     for (const Json& p : json.at("path")) {
       if (p.size() != kPathFields) return false;
       path.push_back({finite(p[0]), Vector3(finite(p[1]), finite(p[2]), finite(p[3])), finite(p[4])});
@@ -64,7 +66,7 @@ bool from_flight_record(const std::string& text, MissionReport& mission) {
       for (std::size_t i = 0; i < core::kStageCount; ++i) d.stage_s[i] = finite(j[12 + i]);
       decisions.push_back(d);
     }
-  } catch (const Json::exception&) {
+  } catch (const std::exception&) {
     return false;
   }
   mission.path = std::move(path);

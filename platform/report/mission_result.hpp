@@ -90,6 +90,14 @@ struct PoolUse {
   bool tells_use{};  ///< Its owner says how much is in use.
 };
 
+/// What a map or a planner took on the machine that simulates, and what the work that it counted is worth: at
+/// the lowest of the prices that it was compared with (mission/work_check.hpp).
+struct WorkRecord {
+  std::string stage;
+  double measured_s{};  ///< Processor time of all its calls.
+  double counted_s{};
+};
+
 /// One change of what the failsafe does.
 struct FailsafeRecord {
   double time_s{};
@@ -114,6 +122,7 @@ struct MissionReport {
   std::vector<DecisionRecord> decisions;
   std::vector<PathPoint> path;  ///< At 10 Hz.
   std::vector<PoolUse> pools;
+  std::vector<WorkRecord> work;
   SafetyRecord safety;
 };
 

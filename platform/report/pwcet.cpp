@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/random/counter_rng.hpp"
+
 namespace roborun::report {
 namespace {
 
@@ -13,6 +15,7 @@ constexpr std::size_t kFewest = 100;
 constexpr double kIndependent = 1.96;
 constexpr double kStationary = 1.36;
 constexpr double kFits = 0.874;
+constexpr std::size_t kRefits = 200;
 constexpr double kEuler = 0.57721566490153286;
 
 double runs_z(std::span<const double> x) {
@@ -51,6 +54,63 @@ double halves_ks(std::span<const double> x) {
   return distance * std::sqrt(na * nb / (na + nb));
 }
 
+struct Gumbel {
+  double location{}, scale{};
+  [[nodiscard]] double level(double reduced) const { return location + scale * reduced; }
+};
+
+/// By probability-weighted moments. `x` ascending.
+Gumbel fit_gumbel(std::span<const double> x) {
+  const auto count = static_cast<double>(x.size());
+  double b0 = 0, b1 = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    b0 += x[i] / count;
+    b1 += x[i] * static_cast<double>(i) / (count - 1) / count;
+  }
+  const double scale = (2 * b1 - b0) / std::log(2.0);
+  return {b0 - kEuler * scale, scale};
+}
+
+double reduced_of(double probability) { return -std::log(-std::log(probability)); }
+
+/// Fits to samples as large as ours, drawn from our fit: how much the fit owes to chance.
+std::vector<Gumbel> refits(const Gumbel& fit, std::size_t count) {
+  core::CounterRng rng(1, count);
+  std::vector<Gumbel> all;
+  std::vector<double> x(count);
+  for (std::size_t i = 0; i < kRefits; ++i) {
+    for (double& v : x) v = fit.level(reduced_of(std::clamp(rng.uniform(), 1e-12, 1.0 - 1e-12)));
+    std::sort(x.begin(), x.end());
+    all.push_back(fit_gumbel(x));
+  }
+  return all;
+}
+
+ReturnLevel level_at(double reduced, const Gumbel& fit, const std::vector<Gumbel>& again) {
+  std::vector<double> levels;
+  levels.reserve(again.size());
+  for (const Gumbel& g : again) levels.push_back(g.level(reduced));
+  std::sort(levels.begin(), levels.end());
+  return {reduced, fit.level(reduced), levels[kRefits / 40], levels[kRefits - 1 - kRefits / 40]};
+}
+
+/// `x` ascending.
+void fill_levels(std::span<const double> x, Pwcet& out) {
+  const Gumbel fit{out.location_us, out.scale_us};
+  for (std::size_t i = 0; i < x.size(); ++i)
+    out.observed_us.emplace_back(reduced_of(static_cast<double>(i + 1) / static_cast<double>(x.size() + 1)),
+                                 x[i]);
+  const std::vector<Gumbel> again = refits(fit, x.size());
+  const double last = std::log(1e9);
+  const double first = out.observed_us.front().first;
+  constexpr int kPoints = 40;
+  for (int i = 0; i <= kPoints; ++i)
+    out.levels.push_back(level_at(first + (last - first) * i / kPoints, fit, again));
+  out.exceeded_1e9_us = out.levels.back().level_us;
+  out.exceeded_1e9_low_us = out.levels.back().low_us;
+  out.exceeded_1e9_high_us = out.levels.back().high_us;
+}
+
 }  // namespace
 
 Pwcet fit_pwcet(std::span<const double> maximum_us) {
@@ -65,13 +125,9 @@ Pwcet fit_pwcet(std::span<const double> maximum_us) {
   std::vector<double> x(maximum_us.begin(), maximum_us.end());
   std::sort(x.begin(), x.end());
   const auto count = static_cast<double>(n);
-  double b0 = 0, b1 = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    b0 += x[i] / count;
-    b1 += x[i] * static_cast<double>(i) / (count - 1) / count;
-  }
-  out.scale_us = (2 * b1 - b0) / std::log(2.0);
-  out.location_us = b0 - kEuler * out.scale_us;
+  const Gumbel fit = fit_gumbel(x);
+  out.scale_us = fit.scale;
+  out.location_us = fit.location;
   if (!(out.scale_us > 0.0)) {
     out.verdict = "refused: all blocks are equal";
     return out;
@@ -93,7 +149,7 @@ Pwcet fit_pwcet(std::span<const double> maximum_us) {
   else {
     out.fitted = true;
     out.verdict = "supporting evidence";
-    out.exceeded_1e9_us = out.location_us + out.scale_us * std::log(1e9);
+    fill_levels(x, out);
   }
   return out;
 }

@@ -6,8 +6,17 @@
 
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace roborun::report {
+
+/// Of the fitted distribution, where a block's maximum lies below it with probability exp(-exp(-reduced)).
+struct ReturnLevel {
+  double reduced{};
+  double level_us{};
+  double low_us{}, high_us{};  ///< 95 % of 200 fits to samples drawn from the fit (parametric bootstrap).
+};
 
 struct Pwcet {
   bool fitted{false};
@@ -15,10 +24,15 @@ struct Pwcet {
   double location_us{};  ///< Gumbel, by probability-weighted moments.
   double scale_us{};
   double exceeded_1e9_us{};  ///< Exceeded by one block in 1e9, if the fit holds.
-  double independence_z{};   ///< Wald-Wolfowitz runs test about the median.
+  double exceeded_1e9_low_us{},
+      exceeded_1e9_high_us{};  ///< Its 95 % band: of the fit's noise, not of its model.
+  double independence_z{};     ///< Wald-Wolfowitz runs test about the median.
   double
       stationarity_ks{};  ///< Kolmogorov-Smirnov distance of the two halves, times sqrt(n1 n2 / (n1 + n2)).
   double fit_ks{};        ///< The same of sample against Gumbel, times sqrt(n).
+  // For the return-level plot of a fit that was not refused.
+  std::vector<std::pair<double, double>> observed_us;  ///< (reduced, maximum) of every block.
+  std::vector<ReturnLevel> levels;                     ///< Up to one block in 1e9.
 };
 
 /// `maximum_us`: of equally long blocks, in order. Refuses fewer than 100 blocks, |z| > 1.96 (not

@@ -3,6 +3,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "platform/input/json_reader.hpp"
+
 namespace roborun::report {
 namespace {
 
@@ -22,7 +24,7 @@ std::string to_line(const MissionResult& result) {
 
 std::optional<MissionResult> from_line(const std::string& line) {
   try {
-    const Json json = Json::parse(line);
+    const Json json = input::parse_json(line);
     MissionResult r;
     r.design = json.at("design");
     r.profile = json.at("profile");
@@ -52,7 +54,7 @@ std::optional<MissionResult> from_line(const std::string& line) {
     r.reason = json.at("reason");
     r.speed_limit_mps = number(json.at("speed_limit_mps"));
     return r;
-  } catch (const nlohmann::json::exception&) {
+  } catch (const std::exception&) {
     return std::nullopt;
   }
 }

@@ -6,9 +6,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <set>
 
 #include "platform/report/svg.hpp"
+#include "platform/report/sweep_sensitivity.hpp"
 
 namespace roborun::report {
 namespace {
@@ -122,26 +122,6 @@ struct Metric {
   bool printed;
 };
 
-/// The points of one design: knob, and what was measured at it.
-std::vector<std::pair<double, Estimate>> curve(const std::vector<SweepRow>& rows, const std::string& profile,
-                                               const std::string& design, const Knob& knob,
-                                               const Metric& metric) {
-  std::set<double> values;
-  for (const SweepRow& row : rows) values.insert(knob.value(row));
-  std::vector<std::pair<double, Estimate>> points;
-  for (const double value : values) {
-    std::vector<const SweepRow*> mine;
-    for (const SweepRow& row : rows) {
-      if (row.result.profile == profile && row.result.design == design && !(knob.value(row) < value) &&
-          !(knob.value(row) > value))
-        mine.push_back(&row);
-    }
-    const Estimate e = estimate(mine, metric.value);
-    if (std::isfinite(e.mean)) points.emplace_back(value, e);
-  }
-  return points;
-}
-
 std::vector<std::string> designs_of(const std::vector<SweepRow>& rows, const std::string& profile) {
   std::vector<std::string> designs;
   for (const DesignSummary& s : summarise(rows)) {
@@ -150,45 +130,59 @@ std::vector<std::string> designs_of(const std::vector<SweepRow>& rows, const std
   return designs;
 }
 
+/// What a chart shows of one design over a knob.
+struct Curve {
+  std::vector<Estimate> points;  ///< One per value of the knob, or none.
+  std::string missing;           ///< Why there is none.
+};
+
 void draw_sensitivity(Svg& svg, const std::vector<SweepRow>& rows, const std::string& profile,
                       const Knob& knob, const Metric& metric, double left, double top) {
   const std::vector<std::string> designs = designs_of(rows, profile);
+  std::vector<Curve> curves;
   double low = std::numeric_limits<double>::infinity();
   double high = 0.0;
-  std::set<double> knobs;
   for (const std::string& design : designs) {
-    for (const auto& [value, e] : curve(rows, profile, design, knob, metric)) {
-      knobs.insert(value);
-      low = std::min(low, e.mean);
-      high = std::max(high, e.mean);
+    const Sensitivity s = sensitivity_of(rows, profile, design, knob);
+    Curve& curve = curves.emplace_back();
+    curve.missing = s.missing;
+    for (const auto& missions : s.at) {
+      if (missions.empty()) continue;
+      curve.points.push_back(estimate(missions, metric.value));
+      low = std::min(low, curve.points.back().mean);
+      high = std::max(high, curve.points.back().mean);
     }
   }
   if (!(high > 0.0 && low > 0.0)) low = high = 1.0;
   const Panel panel{left, top, 270.0, 180.0, low / 1.6, high * 1.6, true};
   panel.draw(svg, fmt::format("{} over {}", metric.name, knob.name));
-  const double first = knobs.empty() ? 0.0 : *knobs.begin();
-  const double span = knobs.empty() ? 1.0 : std::max(*knobs.rbegin() - first, 1e-9);
-  const auto x = [&](double value) {
-    return panel.left + panel.width * (0.1 + 0.8 * (knobs.size() > 1 ? (value - first) / span : 0.5));
+  const auto x = [&](std::size_t i) {
+    return panel.left + panel.width * (0.1 + 0.4 * static_cast<double>(i));  // three values
   };
-  for (const double value : knobs)
-    svg.text(x(value), panel.top + panel.height + 16.0, fmt::format("{:g}", value), "middle", 11, kSoft);
-  for (std::size_t i = 0; i < designs.size(); ++i) {
-    const auto points = curve(rows, profile, designs[i], knob, metric);
-    std::string line;
-    for (const auto& [value, e] : points) line += fmt::format("{:.1f},{:.1f} ", x(value), panel.y(e.mean));
-    svg.add(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="2"/>)", line, colour_of(i));
-    for (const auto& [value, e] : points) {
-      panel.whisker(svg, x(value), e);
-      svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="3.5" fill="{}"/>)", x(value), panel.y(e.mean),
-              colour_of(i));
+  for (std::size_t i = 0; i < knob.values.size(); ++i)
+    svg.text(x(i), panel.top + panel.height + 16.0, fmt::format("{:g}", knob.values.at(i)), "middle", 11,
+             kSoft);
+  for (std::size_t d = 0; d < designs.size(); ++d) {
+    const std::vector<Estimate>& points = curves[d].points;
+    if (points.empty()) {
+      svg.text(panel.left + 8.0, panel.top + 18.0 + 16.0 * static_cast<double>(d),
+               fmt::format("{}: {}", designs[d], curves[d].missing), "start", 11, colour_of(d));
+      continue;
     }
-    if (points.size() < 2) continue;
-    std::string ratio = fmt::format("{:.2f}x", points.back().second.mean / points.front().second.mean);
-    const auto p = published(designs[i]);
+    std::string line;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      line += fmt::format("{:.1f},{:.1f} ", x(i), panel.y(points[i].mean));
+    svg.add(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="2"/>)", line, colour_of(d));
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      panel.whisker(svg, x(i), points[i]);
+      svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="3.5" fill="{}"/>)", x(i), panel.y(points[i].mean),
+              colour_of(d));
+    }
+    std::string ratio = fmt::format("{:.2f}x", points.back().mean / points.front().mean);
+    const auto p = published(designs[d]);
     if (p && metric.printed) ratio += fmt::format(" [{:g}x]", knob.printed_ratio(*p));
-    svg.text(panel.left + 4.0 + 90.0 * static_cast<double>(i), panel.top + panel.height + 33.0, ratio,
-             "start", 12, colour_of(i), "bold");
+    svg.text(panel.left + 4.0 + 90.0 * static_cast<double>(d), panel.top + panel.height + 33.0, ratio,
+             "start", 12, colour_of(d), "bold");
   }
 }
 
@@ -318,10 +312,11 @@ std::string sensitivity_svg(const std::vector<SweepRow>& rows, const std::string
       draw_sensitivity(svg, rows, profile, kKnobs[k], kMetrics[m], 60.0 + 350.0 * static_cast<double>(k),
                        70.0 + 260.0 * static_cast<double>(m));
   }
-  svg.text(
-      60.0, 850.0,
-      "below each chart: highest knob against lowest, [ ]: published; whiskers: 95 % interval over seeds",
-      "start", 12, kSoft);
+  svg.text(60.0, 850.0,
+           "only missions that differ in nothing but the knob; below each chart: highest knob against "
+           "lowest, [ ]: "
+           "published; whiskers: 95 % interval over seeds",
+           "start", 12, kSoft);
   return svg.finish(1100.0, 866.0);
 }
 

@@ -15,8 +15,10 @@ namespace roborun::report {
 /// % interval over seeds, dashes: what RoboRun printed.
 [[nodiscard]] std::string overall_svg(const std::vector<SweepRow>& rows);
 
-/// Mission time, velocity and energy over density, spread and distance, logarithmic: a line a design of
+/// Mission time, velocity and energy over density, spread and distance, logarithmic: one line per design of
 /// `profile`, whiskers as above, and the ratio of the highest knob to the lowest beside the published one.
+/// Drawn from missions in which only that knob differs (sweep_sensitivity.hpp); where there are none the
+/// chart says which environments are missing.
 [[nodiscard]] std::string sensitivity_svg(const std::vector<SweepRow>& rows, const std::string& profile);
 
 /// One flight a design: velocity, precision and the latency of each stage over time, with the deadline, and

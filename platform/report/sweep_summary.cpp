@@ -241,7 +241,15 @@ std::string sweep_table(const std::vector<SweepRow>& rows) {
         gains += fmt::format(fmt::runtime(kGainRow), "  published", 27, "5", "4.5", "4", "11", "36 %");
     }
   }
-  if (!gains.empty()) text += '\n' + gain_head() + gains + '\n';
+  if (!gains.empty()) {
+    text += '\n' + gain_head() + gains + '\n';
+    if (std::any_of(summaries.begin(), summaries.end(),
+                    [](const DesignSummary& s) { return s.profile == "paper"; }))
+      text +=
+          "profile paper charges what the authors' stages cost; with stages that are fast, awareness gains "
+          "less: "
+          "roborun sweep compare\n\n";
+  }
   for (const SweepRow& row : rows) {
     const MissionResult& r = row.result;
     if (counts(r)) continue;

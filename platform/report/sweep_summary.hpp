@@ -1,7 +1,6 @@
 /// What a sweep says about each design: means, 95 % intervals over seeds, and the published values.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -59,20 +58,6 @@ struct Published {
       time_ratio_distance;  ///< Mission time, highest to lowest knob.
 };
 [[nodiscard]] std::optional<Published> published(const std::string& design);
-
-/// A knob of the environments, and the published ratio of mission times at its highest to its lowest value.
-struct Knob {
-  const char* name;
-  double (*value)(const SweepRow&);
-  double (*printed_ratio)(const Published&);
-};
-inline constexpr std::array<Knob, 3> kKnobs{
-    {{"density", [](const SweepRow& r) { return r.density_ratio; },
-      [](const Published& p) { return p.time_ratio_density; }},
-     {"spread, m", [](const SweepRow& r) { return r.spread_m; },
-      [](const Published& p) { return p.time_ratio_spread; }},
-     {"goal distance, m", [](const SweepRow& r) { return r.distance_m; },
-      [](const Published& p) { return p.time_ratio_distance; }}}};
 
 /// In the order of first appearance.
 [[nodiscard]] std::vector<DesignSummary> summarise(const std::vector<SweepRow>& rows);

@@ -62,8 +62,14 @@ void LaneSet::stop() noexcept {
   unlock_memory();
 }
 
-void LaneSet::drain_trace(std::vector<core::SlotEvent>& events) {
-  core::SlotEvent event;
+std::uint64_t LaneSet::events_lost() const noexcept {
+  std::uint64_t sum = 0;
+  for (const core::TraceRing& ring : ring_) sum += ring.dropped();
+  return sum;
+}
+
+void LaneSet::drain_trace(std::vector<core::TraceEvent>& events) {
+  core::TraceEvent event;
   for (core::TraceRing& ring : ring_) {
     while (ring.pop(event)) events.push_back(event);
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -19,7 +20,7 @@ struct LaneSetConfig {
   Nanos minor_frame{core::kMinorFrame};
   HeapSeal seal{HeapSeal::kCount};
   bool best_effort{false};  ///< Runs without what is missing.
-  bool trace{false};        ///< Every slot of every frame is kept for drain_trace().
+  bool trace{false};        ///< Every frame and slot is kept for drain_trace(), which is to be called often.
   /// Shared libraries whose pages are not needed locked: names as of unlock_libraries().
   std::span<const char* const> unneeded_libraries{};
 };
@@ -46,7 +47,9 @@ class LaneSet {
   /// not watched. More than once is harmless.
   void stop() noexcept;
   /// Appends what the lanes traced since the call before.
-  void drain_trace(std::vector<core::SlotEvent>& events);
+  void drain_trace(std::vector<core::TraceEvent>& events);
+  /// Events that came while nobody drained for too long; never decreases.
+  [[nodiscard]] std::uint64_t events_lost() const noexcept;
 
   [[nodiscard]] const core::LaneExecutive& lane(core::LaneId id) const noexcept { return lane_[index(id)]; }
   [[nodiscard]] core::LaneExecutive& lane(core::LaneId id) noexcept { return lane_[index(id)]; }

@@ -32,7 +32,7 @@ bool is_mount(std::string_view key) {
 }
 
 std::set<std::string_view> tables() {
-  std::set<std::string_view> names{"vehicle", "stopping", "camera", "lidar"};
+  std::set<std::string_view> names{"vehicle", "stopping", "camera", "lidar", "imu", "gnss"};
   for (const VehicleKey& key : kVehicleKeys) names.insert(key.table);
   return names;
 }
@@ -50,6 +50,8 @@ class VehicleReader {
     vehicle.model.measured_stopping = measured_stopping();
     read_sensors("camera", vehicle.rig.cameras, nullptr);
     read_sensors("lidar", vehicle.rig.lidars, &vehicle.patterns);
+    read_model_of("imu", vehicle.rig.imu);
+    read_model_of("gnss", vehicle.rig.gnss);
     if (vehicle.rig.cameras.empty() && vehicle.rig.lidars.empty())
       reader_.refuse(root_, "camera", "missing: must have at least one [[camera]] or [[lidar]]");
     return vehicle;
@@ -86,6 +88,32 @@ class VehicleReader {
       reader_.allow_keys(table(name), fmt::format("[{}]", name), known);
     }
   }
+  template <typename Model>
+  void read_model_of(const char* name, Model& model) const {
+    if (root_.get(name) == nullptr) return;
+    const toml::table& from = table(name);
+    reader_.allow_keys(from, fmt::format("[{}]", name), {"model"});
+    (void)reader_.need(from, "model", fmt::format("[{}]", name));
+    read_model_name(from, model);
+  }
+  template <typename Model>
+  void read_model_name(const toml::table& from, Model& model) const {
+    const toml::node* node = from.get("model");
+    if (node == nullptr) return;
+    const auto found = model_of<Model>(node->value<std::string>().value_or(""));
+    if (!found)
+      reader_.refuse(*node, "model",
+                     fmt::format("must be one of \"{}\"", fmt::join(names_of(Model{}), "\", \"")));
+    model = *found;
+  }
+  void read_invalid_ratio(const toml::table& from, CameraSpec& camera) const {
+    const toml::node* node = from.get("invalid_ratio");
+    if (node == nullptr) return;
+    if (camera.model == CameraModel::kClean)
+      reader_.refuse(*node, "invalid_ratio", "must not be there without a model other than \"clean\"");
+    camera.invalid_ratio = reader_.number(*node, "invalid_ratio", 0.0, kMostInvalid);
+  }
+  void read_invalid_ratio(const toml::table&, LidarSpec&) const {}
   template <typename Sensors>
   void read_sensors(const char* name, Sensors& sensors, std::vector<std::string>* patterns) const {
     const toml::node* list = root_.get(name);
@@ -117,12 +145,14 @@ class VehicleReader {
       known.insert(key.key);
       if (is_mount(key.key) && from.get(key.key) == nullptr) continue;
       const toml::node& node = reader_.need(from, key.key, where);
-      const double value = reader_.number(node, key.key, key.low, key.high);
-      if (is_whole(key.key) && value != std::floor(value))
-        reader_.refuse(node, key.key, "must be a whole number");
-      (void)assign(key, sensor, value);
+      (void)assign(key, sensor,
+                   is_whole(key.key) ? reader_.whole(node, key.key, key.low, key.high)
+                                     : reader_.number(node, key.key, key.low, key.high));
     }
-    if (where == "[[lidar]]") known.insert("pattern");
+    known.insert("model");
+    known.insert(where == "[[lidar]]" ? "pattern" : "invalid_ratio");
+    read_model_name(from, sensor.model);
+    read_invalid_ratio(from, sensor);
     reader_.allow_keys(from, where, known);
     if (!(sensor.range_m > sensor.range_min_m))
       reader_.refuse(*from.get("range_m"), "range_m", "must be more than range_min_m");

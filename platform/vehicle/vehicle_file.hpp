@@ -23,7 +23,9 @@ struct Vehicle {
 /// Tables [vehicle] name, about; [body], [propulsion], [drag], [power], [limits] with every key of
 /// kVehicleKeys: nothing about a vehicle is assumed; [stopping] (quadratic_s2pm, linear_s, constant_m) where
 /// it has been measured; one [[camera]] or [[lidar]] per sensor, with every key of kCameraKeys or kLidarKeys
-/// but those of the mount, which are 0 where they are not there (and `pattern = FILE`: a line "azimuth_deg elevation_deg" per direction, instead of rings). Throws InputError with file, line, key and what would be right, also for a vehicle
+/// but those of the mount, which are 0 where they are not there (and `pattern = FILE`: a line "azimuth_deg elevation_deg" per direction, instead of rings).
+/// `model` says which errors the simulator gives a sensor (core/sensor_model.hpp), in each [[camera]] and [[lidar]], and in the tables [imu] and
+/// [gnss]; without it: `clean`. A camera of another model may have `invalid_ratio`. Throws InputError with file, line, key and what would be right, also for a vehicle
 /// that cannot fly.
 [[nodiscard]] Vehicle vehicle_from_toml(const std::string& path, const std::string& text);
 /// A shipped vehicle by its name, or one of a file. Throws InputError.

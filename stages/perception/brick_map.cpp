@@ -63,14 +63,21 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
       ny_(even_bricks(config.bounds_W.max_W.y() - corner_W_.y())),
       nz_(even_bricks(config.bounds_W.max_W.z() - corner_W_.z())) {
   const std::size_t positions = position_count(config.bounds_W);
+  // Tables with a place for each position, and the list of free bricks, are in use as a whole from now on.
   slot_ = arena.take<std::int32_t>(positions, "map positions");
+  arena.last_pool().use(slot_.size());
   order_ = arena.take<std::uint32_t>(positions, "map order");
+  order_pool_ = &arena.last_pool();
   order_key_ = arena.take<std::uint16_t>(positions, "map order keys");
+  arena.last_pool().use(order_key_.size());
   brick_ = arena.take<Brick>(config.max_bricks, "map bricks");
   brick_pool_ = &arena.last_pool();
   free_list_ = arena.take<std::uint32_t>(config.max_bricks, "map free list");
+  arena.last_pool().use(free_list_.size());
   dirty_ = arena.take<std::uint32_t>(config.max_bricks, "map dirty list");
+  dirty_pool_ = &arena.last_pool();
   known_count_ = arena.take<std::uint16_t>(config.max_bricks, "map known counts");
+  known_pool_ = &arena.last_pool();
   std::fill(slot_.begin(), slot_.end(), kUnknownBrick);
   free_brick_.fill(evidence::kFree);
   surface_brick_.fill(evidence::kUnknown);
@@ -125,6 +132,7 @@ Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexce
     }
     slot = static_cast<std::int32_t>(free_list_[--free_count_]);
     brick_pool_->use(brick_.size() - free_count_);
+    known_pool_->use(brick_.size() - free_count_);
     Brick& fresh = brick_[static_cast<std::size_t>(slot)];
     fresh.fill(was_free ? evidence::kFree : evidence::kUnknown);
     fresh.x = bx;
@@ -238,6 +246,7 @@ void BrickMap::refresh(Brick& brick) noexcept {
 }
 
 void BrickMap::refresh_dirty() noexcept {
+  dirty_pool_->use(dirty_count_);
   for (std::size_t i = 0; i < dirty_count_; ++i) {
     Brick& b = brick_[dirty_[i]];
     refresh(b);

@@ -188,6 +188,9 @@ class BrickMap final : public OccupancyMap, private MapView {
   std::span<std::int32_t> slot_;  ///< Brick of each position, or what is known without one.
   std::span<Brick> brick_;
   core::PoolRecord* brick_pool_{nullptr};
+  core::PoolRecord* order_pool_{nullptr};
+  core::PoolRecord* dirty_pool_{nullptr};
+  core::PoolRecord* known_pool_{nullptr};
   std::span<std::uint32_t> free_list_;
   std::span<std::uint32_t> dirty_;
   std::span<std::uint16_t> known_count_;  ///< Of each brick, once more: an export reads them all.

@@ -204,6 +204,7 @@ std::size_t BrickMap::order_units(const IntegrationRequest& request) noexcept {
     total += count;
   }
   for_each_unit([&](const Position& unit) { order_[start[order_key_[unit_index(unit)]]++] = packed(unit); });
+  order_pool_->use(total);
   return total;
 }
 

@@ -33,7 +33,9 @@ std::size_t view_of(const std::array<float, 3>& p) noexcept {
 }  // namespace
 
 CloudImages::CloudImages(const Config& config, core::Arena& arena) noexcept
-    : config_(config), depth_m_(arena.take<float>(kImages * config.pixels * config.pixels, "cloud images")) {
+    : config_(config),
+      depth_m_(arena.take<float>(kImages * config.pixels * config.pixels, "cloud images")),
+      pool_(arena.last_pool()) {
   ROBORUN_ASSERT(config.validate() == Status::kOk);
 }
 
@@ -44,6 +46,7 @@ Status CloudImages::make(const PosedCloud& cloud) noexcept {
   const std::size_t side = config_.pixels, pixels = side * side;
   bool met = false;
   if (usable) {
+    pool_.use(depth_m_.size());
     std::fill(depth_m_.begin(), depth_m_.end(), std::numeric_limits<float>::quiet_NaN());
     for (const std::array<float, 3>& p : cloud.points_L) {
       if (!(std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]))) {

@@ -58,6 +58,7 @@ class CloudImages {
  private:
   Config config_;
   std::span<float> depth_m_;
+  core::PoolRecord& pool_;
   std::array<PosedDepthFrame, kImages> frame_{};
   std::size_t count_{0};
   Counters counters_{};

@@ -59,6 +59,7 @@ std::size_t DepthPyramid::arena_bytes(std::size_t max_width, std::size_t max_hei
 DepthPyramid::DepthPyramid(core::Arena& arena, std::size_t max_width, std::size_t max_height) noexcept
     : max_width_(max_width), max_height_(max_height) {
   memory_ = arena.take<Entry>(entry_count(max_width, max_height), "map depth pyramid");
+  pool_ = &arena.last_pool();
 }
 
 void DepthPyramid::bridge_columns(const firmware_if::DepthFrame& frame, std::size_t first, std::size_t y,
@@ -131,6 +132,7 @@ Status DepthPyramid::build(const firmware_if::DepthFrame& frame, int tile_shift)
     width = to_width;
     height = to_height;
   }
+  pool_->use(static_cast<std::size_t>(fine - memory_.data()) + width * height);
   return Status::kOk;
 }
 

@@ -74,6 +74,7 @@ class DepthPyramid {
   bool shows_surface_{false};
   std::array<Level, kMaxLevels> level_{};
   std::span<Entry> memory_{};
+  core::PoolRecord* pool_{nullptr};
 };
 
 }  // namespace roborun::stages

@@ -11,9 +11,11 @@ namespace roborun::stages {
 
 PointCloud::PointCloud(const Config& config, core::Arena& arena) noexcept
     : grid_(arena.take<Entry>(config.max_points, "cloud grid")),
+      grid_pool_(arena.last_pool()),
       point_(arena.take<CloudPoint>(config.max_points, "cloud points")),
       point_pool_(arena.last_pool()),
-      used_(arena.take<std::uint32_t>(config.max_points, "cloud used entries")) {
+      used_(arena.take<std::uint32_t>(config.max_points, "cloud used entries")),
+      used_pool_(arena.last_pool()) {
   ROBORUN_ASSERT(config.validate() == Status::kOk);
 }
 
@@ -94,7 +96,7 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core
     }
   }
   for (std::size_t i = 0; i < count_; ++i) point_[i].p_W /= point_[i].count;
-  point_pool_.use(count_);
+  for (core::PoolRecord* pool : {&grid_pool_, &point_pool_, &used_pool_}) pool->use(count_);
   if (usable == 0) return Status::kInvalidArgument;
   if (spent) return Status::kBudgetSpent;
   return full ? Status::kCapacity : Status::kOk;

@@ -64,9 +64,11 @@ class PointCloud {
   bool add(const Vector3& p_W, double cell_m) noexcept;
 
   std::span<Entry> grid_;
+  core::PoolRecord& grid_pool_;
   std::span<CloudPoint> point_;
   core::PoolRecord& point_pool_;
   std::span<std::uint32_t> used_;  ///< Grid entries to clear before the next step.
+  core::PoolRecord& used_pool_;
   FrameGuard guard_{};
   std::size_t count_{0};
   double seen_volume_m3_{0.0};

@@ -23,6 +23,7 @@ void NodeGrid::reset(const Aabb& box_W) noexcept {
   }
   for (std::size_t i = 0; i < 3; ++i)
     size_[i] = 1 + static_cast<std::int32_t>(size_m[static_cast<int>(i)] / side_m_);
+  head_pool_.use(static_cast<std::size_t>(std::int64_t{size_[0]} * size_[1] * size_[2]));
   std::fill(head_.begin(), head_.end(), -1);
 }
 
@@ -41,6 +42,7 @@ void NodeGrid::insert(const Vector3& p_W) noexcept {
   std::int32_t& first = head(cell[0], cell[1], cell[2]);
   point_[count_] = {p_W, first};
   first = static_cast<std::int32_t>(count_++);
+  point_pool_.use(count_);
 }
 
 NodeGrid::Near NodeGrid::nearest(const Vector3& p_W) const noexcept {

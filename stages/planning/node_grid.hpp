@@ -28,7 +28,9 @@ class NodeGrid {
   }
   NodeGrid(std::size_t max_points, core::Arena& arena) noexcept
       : point_(arena.take<Point>(max_points, "planner grid points")),
-        head_(arena.take<std::int32_t>(kCells, "planner grid cells")) {}
+        point_pool_(arena.last_pool()),
+        head_(arena.take<std::int32_t>(kCells, "planner grid cells")),
+        head_pool_(arena.last_pool()) {}
 
   /// Forgets all points. Precondition: a finite box that is not empty.
   void reset(const Aabb& box_W) noexcept;
@@ -54,7 +56,9 @@ class NodeGrid {
   }
 
   std::span<Point> point_;
+  core::PoolRecord& point_pool_;
   std::span<std::int32_t> head_;
+  core::PoolRecord& head_pool_;
   std::size_t count_{0};
   Vector3 corner_W_ = Vector3::Zero();
   double side_m_{1.0};

@@ -40,7 +40,9 @@ struct PlanResult {
   Path path_W{};        ///< From the start; empty unless kOk or kBudgetSpent.
   bool reaches_goal{};  ///< The last way-point is the goal (within one cell).
   double cost_m{};      ///< Length of the path.
-  core::Work work{};    ///< units: map lookups; volume_m3: space explored by the tree.
+  /// units: map lookups; volume_m3: space explored by the tree. In lockstep it is what the flight is charged,
+  /// and it is compared with the time that it took (platform/mission/work_check.hpp).
+  core::Work work{};
 };
 
 /// Contract (proved on every implementation by tests/stages/planning/planner_contract_test.cpp):

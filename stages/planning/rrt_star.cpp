@@ -67,6 +67,7 @@ RrtStar::RrtStar(const Config& config, core::Arena& arena) noexcept
       node_(arena.take<Node>(config.max_nodes, "planner nodes")),
       node_pool_(arena.last_pool()),
       visited_(arena.take<std::uint64_t>(kVisited, "planner visited cells")),
+      visited_pool_(arena.last_pool()),
       grid_(config.max_nodes, arena),
       lattice_(config.lattice_nodes, arena) {
   ROBORUN_ASSERT(config.validate() == Status::kOk);
@@ -135,6 +136,7 @@ std::int32_t RrtStar::add_node(const Vector3& p_W, std::int32_t parent, core::Wo
     if (visited_[slot] == key) return index;
     if (visited_[slot] == 0) {
       visited_[slot] = key;
+      visited_pool_.use(++visited_count_);
       break;
     }
   }
@@ -276,6 +278,7 @@ void RrtStar::clear(Search& s) noexcept {
   count_ = 0;
   goal_ = -1;
   std::fill(visited_.begin(), visited_.end(), 0U);
+  visited_count_ = 0;
   const Vector3 reach = Vector3::Constant(request.horizon_m);
   grid_.reset({request.bounds_W.min_W.cwiseMax(request.start_W - reach),
                request.bounds_W.max_W.cwiseMin(request.start_W + reach)});

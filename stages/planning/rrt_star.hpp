@@ -149,9 +149,11 @@ class RrtStar final : public Planner {
   std::span<Node> node_;
   core::PoolRecord& node_pool_;
   std::span<std::uint64_t> visited_;
+  core::PoolRecord& visited_pool_;
   NodeGrid grid_;
   LatticeSearch lattice_;
   std::size_t count_{0};
+  std::size_t visited_count_{0};
   std::int32_t goal_{-1};  ///< The goal's node, once it is reached.
 };
 

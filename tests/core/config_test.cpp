@@ -7,6 +7,7 @@
 #include "core/memory/enum_array.hpp"
 #include "core/range.hpp"
 #include "tests/support/config_death.hpp"
+#include "tests/support/names.hpp"
 
 namespace roborun::core {
 namespace {
@@ -30,6 +31,14 @@ TEST(StageArray, IsIndexedByStageAndByNumber) {
   EXPECT_EQ(sut.size(), kStageCount);
   const std::array<int, kStageCount> plain = sut;
   EXPECT_EQ(plain[4], 7);
+}
+
+TEST(StageId, HasTheNameOfItsSlot) {
+  test::expect_names<StageId>({"point_cloud", "governor", "map", "export", "planner", "smoother"}, "unknown");
+  for (std::size_t i = 0; i < kStageCount; ++i) {
+    const auto id = static_cast<StageId>(i);
+    EXPECT_STREQ(to_string(id), slot(slot_of(id)).name);
+  }
 }
 
 TEST(CostProfileConfigDeathTest, OnlyValidOnesAreMade) {

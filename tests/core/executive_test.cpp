@@ -232,14 +232,64 @@ TEST(LaneExecutive, TellsTheTraceEverySlot) {
   auto b = std::make_unique<Bench>(LaneId::kFlight);
   b->cost(SlotId::kCommit) = us(101);
   b->frame();
-  SlotEvent event;
+  TraceEvent event;
   std::vector<SlotId> slots;
-  while (b->trace.pop(event)) {
+  while (b->trace.pop(event) && !event.is_frame) {
     slots.push_back(event.slot);
     EXPECT_EQ(event.overrun, event.slot == SlotId::kCommit);
   }
   EXPECT_EQ(slots, (std::vector<SlotId>{SlotId::kWorld, SlotId::kSense, SlotId::kCommit, SlotId::kTrack,
                                         SlotId::kPublish}));
+  EXPECT_TRUE(event.is_frame) << "after its pieces";
+  EXPECT_EQ(event.end - event.begin, us(101));
+}
+
+/// Slots that take turns: their pieces follow each other within the frame and sum up to what each is charged.
+TEST(LaneExecutive, PiecesOfTheTraceNeitherOverlapNorLoseTime) {
+  class Turns final : public LaneProgram {
+   public:
+    explicit Turns(VirtualClock& clock) : clock_(clock) {}
+    void run(SlotId slot, LaneExecutive& lane) noexcept override {
+      clock_.advance(us(10));
+      if (slot != SlotId::kMap) return;
+      lane.charge_to(SlotId::kGovernor);
+      clock_.advance(us(3));
+      lane.charge_to(SlotId::kMap);
+      clock_.advance(us(4));
+    }
+
+   private:
+    VirtualClock& clock_;
+  };
+  VirtualClock clock;
+  Turns program(clock);
+  Reactions reactions;
+  const auto trace = std::make_unique<TraceRing>();
+  const auto lane =
+      std::make_unique<LaneExecutive>(LaneId::kDecision, clock, program, reactions, trace.get());
+  lane->start(MonotonicTime{kMinorFrame});
+  clock.set(MonotonicTime{kMinorFrame} + us(5));
+  lane->run_frame();
+  std::array<Nanos, kSlotCount> sum{};
+  MonotonicTime last{kMinorFrame};
+  TraceEvent event;
+  int pieces = 0;
+  while (trace->pop(event) && !event.is_frame) {
+    EXPECT_GE(event.begin, last);
+    EXPECT_GE(event.end, event.begin);
+    last = event.end;
+    sum[static_cast<std::size_t>(event.slot)] += event.end - event.begin;
+    ++pieces;
+  }
+  ASSERT_TRUE(event.is_frame);
+  EXPECT_EQ(pieces, 10) << "eight slots, and map and governor once more";
+  EXPECT_EQ(event.begin - event.release, us(5)) << "the jitter";
+  EXPECT_LE(last, event.end);
+  for (const SlotSpec& spec : kFrameTable) {
+    if (spec.lane != LaneId::kDecision) continue;
+    EXPECT_EQ(sum[static_cast<std::size_t>(spec.id)], lane->statistics(spec.id).time.max()) << spec.name;
+  }
+  EXPECT_EQ(sum[static_cast<std::size_t>(SlotId::kMap)], us(14));
 }
 
 /// What the watchdog asks while a slot still runs and its frame has not been judged.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/random/counter_rng.hpp"
+#include "tests/support/names.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::core {
@@ -207,6 +208,13 @@ TEST(Fence, RefusesBadAreasByNameAndStaysAsItWas) {
   for (std::size_t i = 0; i < Fence::kMaxAreas; ++i)
     EXPECT_EQ(fence.add_circle(FenceSide::kKeepIn, {0, 0}, 9.0), FenceFault::kNone);
   EXPECT_EQ(fence.add_circle(FenceSide::kKeepIn, {0, 0}, 9.0), FenceFault::kTooManyAreas);
+}
+
+TEST(Fence, FaultsSayWhatWouldBeRight) {
+  test::expect_names<FenceFault>(
+      {"nothing is wrong", "must be finite numbers of at most 16000 m", "must have at least three points",
+       "must have at most 32 points", "must not touch or cross itself, and no two points may be equal",
+       "must be above 0", "the upper limit must be above the lower one", "must be at most 16 areas"});
 }
 
 TEST(Fence, NaNAndTheFarAwayAreNeverPermittedAndNothingAllocates) {

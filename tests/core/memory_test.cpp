@@ -30,6 +30,16 @@ TEST(Arena, HandsOutAlignedMemoryUntilItIsFull) {
   EXPECT_EQ(sut.take<char>(8).size(), 8U) << "a refused request takes nothing";
 }
 
+TEST(Arena, FindsAPoolByItsName) {
+  std::array<std::byte, 256> block{};
+  Arena sut(block);
+  EXPECT_EQ(sut.find("bricks"), nullptr);
+  ASSERT_EQ(sut.take<double>(4, "bricks").size(), 4U);
+  ASSERT_NE(sut.find("bricks"), nullptr);
+  EXPECT_EQ(sut.find("bricks")->count, 4U);
+  EXPECT_EQ(sut.find("nodes"), nullptr);
+}
+
 TEST(Arena, RefusesCountsThatOverflow) {
   std::array<std::byte, 64> block{};
   Arena sut(block);

@@ -23,6 +23,20 @@ CameraSpec front() {
   return camera;
 }
 
+TEST(SensorModel, EachHasOneName) {
+  for (std::size_t i = 0; i < kCameraModels.size(); ++i)
+    EXPECT_EQ(to_string(*model_of<CameraModel>(kCameraModels[i])), kCameraModels[i]);
+  EXPECT_EQ(model_of<CameraModel>("oak-d"), CameraModel::kOakD);
+  EXPECT_EQ(model_of<LidarModel>("mid360"), LidarModel::kMid360);
+  EXPECT_EQ(model_of<GnssModel>("m9n"), GnssModel::kM9n);
+  EXPECT_EQ(model_of<ImuModel>("clean"), ImuModel{});
+  EXPECT_EQ(model_of<ImuModel>("m9n"), std::nullopt);
+  EXPECT_EQ(model_of<CameraModel>(""), std::nullopt);
+  EXPECT_EQ(stereo_of(CameraModel::kOakD)->baseline_m, 0.075);
+  EXPECT_EQ(stereo_of(CameraModel::kTof), nullptr);
+  EXPECT_EQ(stereo_of(CameraModel::kClean), nullptr);
+}
+
 TEST(SensorRig, SixCamerasLookAlongTheAxesOfTheBody) {
   const std::array<std::array<double, 9>, 6> R_BC{{{1, 0, 0, 0, 1, 0, 0, 0, 1},
                                                    {0, -1, 0, 1, 0, 0, 0, 0, 1},

@@ -31,6 +31,12 @@ TEST(VehicleModel, RefusesWhatCannotHoverTiltFlyFastOrStop) {
   VehicleModel upright;
   upright.tilt_rad = 0.3;  // 3 m/s2 sideways, 4 wanted
   EXPECT_NE(cannot_fly(upright, 25.0), nullptr);
+  VehicleModel leaning;
+  leaning.tilt_rad = 1.1;  // holds its height with a thrust-to-weight of 2.2
+  leaning.max_thrust_N = 0.25 * 2.0 * leaning.mass_kg * 9.81;
+  ASSERT_NE(cannot_fly(leaning, 25.0), nullptr);
+  EXPECT_NE(std::string(cannot_fly(leaning, 25.0)).find("limits.tilt_rad: must have thrust"),
+            std::string::npos);
   VehicleModel draggy;
   draggy.speed_mps = 30.0;
   draggy.drag_quadratic_Ns2pm2 = 0.5;

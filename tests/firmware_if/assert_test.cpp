@@ -6,6 +6,7 @@
 
 #include "firmware_if/status.hpp"
 #include "tests/support/config_death.hpp"
+#include "tests/support/names.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun {
@@ -57,6 +58,12 @@ TEST(Assert, DoesNothingAndAllocatesNothingWhenTheConditionHolds) {
 TEST(Result, HasNoValueToReadWhereThereIsNone) {
   Result<int> none = Status::kNotReady;
   EXPECT_DEATH((void)none.value(), "");
+}
+
+TEST(Status, HasANameForMessages) {
+  test::expect_names<Status>({"ok", "not ready", "invalid argument", "budget spent", "capacity", "stale",
+                              "start blocked", "goal blocked", "no path", "infeasible", "i/o"},
+                             "unknown status");
 }
 
 }  // namespace

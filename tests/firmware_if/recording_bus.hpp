@@ -13,12 +13,14 @@ class RecordingBus final : public firmware_if::CanBus {
   std::vector<firmware_if::CanFrame> sent;
   std::deque<firmware_if::CanFrame> incoming;
   Status answer{Status::kOk};
+  Status hears{Status::kOk};  ///< Any other: what receive() answers.
 
   [[nodiscard]] Status send(std::span<const firmware_if::CanFrame> transfer) noexcept override {
     if (answer == Status::kOk) sent.insert(sent.end(), transfer.begin(), transfer.end());
     return answer;
   }
   [[nodiscard]] Status receive(firmware_if::CanFrame& frame) noexcept override {
+    if (hears != Status::kOk) return hears;
     if (incoming.empty()) return Status::kNotReady;
     frame = incoming.front();
     incoming.pop_front();

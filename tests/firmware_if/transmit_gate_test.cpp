@@ -210,6 +210,12 @@ TEST(TransmitGate, RefusesAnyOtherNumberOfThrottles) {
   EXPECT_EQ(rig.bus.sent.size(), 1U);
 }
 
+TEST(TransmitGate, RefusesAMessageThatIsNotOnItsList) {
+  Rig rig;
+  EXPECT_EQ(rig.sut.send(dronecan::RawImu{}, rig.now), Status::kInvalidArgument);
+  EXPECT_TRUE(rig.bus.sent.empty());
+}
+
 TEST(TransmitGate, KeepsTheRateAndCountsTransferIds) {
   Rig rig;
   unsigned sent = 0;

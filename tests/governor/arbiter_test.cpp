@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/names.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::governor {
@@ -114,6 +115,18 @@ TEST(Arbiter, DoesNotAllocate) {
     sum += static_cast<unsigned>(arbitrate(static_cast<ConditionSet>(set), Phase::kMission));
   EXPECT_GT(sum, 0U);
   EXPECT_EQ(scope.count(), 0U);
+}
+
+TEST(Arbiter, AnActionThatIsNoneKills) {
+  EXPECT_EQ(phase_after(static_cast<Action>(kActionCount), Phase::kMission), Phase::kKilled);
+}
+
+TEST(Arbiter, ActionsConditionsAndPhasesHaveTheNamesOfScenarioFiles) {
+  test::expect_names<Action>({"go_on", "hold", "return", "land", "terminate", "kill"});
+  test::expect_names<Condition>({"battery_low", "battery_critical", "fence", "gnss", "depth", "can_telemetry",
+                                 "link", "wind", "planner", "map", "watchdog", "kill"});
+  test::expect_names<Phase>(
+      {"ground", "take_off", "mission", "hold", "return", "land", "terminated", "killed"});
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/random/counter_rng.hpp"
+#include "tests/support/names.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::governor {
@@ -147,6 +148,12 @@ TEST(Governor, DecideDoesNotAllocate) {
   const test::NoAllocScope scope;
   (void)sut.decide(p, {1, 50.0});
   EXPECT_EQ(scope.count(), 0U);
+}
+
+TEST(Governor, DesignsAndWhatSetTheBudgetHaveTheNamesOfReports) {
+  test::expect_names<Design>({"aware", "static", "static-fair"}, "unknown");
+  test::expect_names<BudgetSource>({"trajectory", "visibility", "shortest", "longest", "failures", "fixed"},
+                                   "unknown");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "core/random/counter_rng.hpp"
 #include "governor/solver/certificate.hpp"
 #include "governor/solver/lattice_solver.hpp"
+#include "tests/support/names.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::governor {
@@ -309,6 +310,24 @@ TEST(DriftScale, RisesAtOnceFallsSlowlyAndIsBounded) {
   sut.observe(1.0, kNan);
   sut.observe(0.0, 1.0);
   EXPECT_DOUBLE_EQ(sut.value(), 4.0);
+}
+
+TEST(LatticeSolver, ConstraintsAndReasonsHaveTheNamesOfReports) {
+  test::expect_names<Constraint>(
+      {"deadline", "v0_zero", "v0_v1", "v_sensor", "v_map", "v2_zero", "v0_max", "v1_max", "v2_max"},
+      "unknown");
+  const std::array<const char*, kReasons.size()> names{"g_avg",           "d_obs",        "g_min",
+                                                       "empty_precision", "empty_volume", "too_slow"};
+  for (std::size_t i = 0; i < names.size(); ++i) EXPECT_STREQ(to_string(kReasons[i]), names[i]);
+  EXPECT_STREQ(to_string(static_cast<Reason>(kGapAverage | kObstacle)), "unknown");
+}
+
+TEST(Certificate, VerdictsSayWhatIsWrong) {
+  test::expect_names<Verdict>({"accepted", "precision outside its interval", "volume outside its bounds",
+                               "late", "latency or objective wrong", "multiplier negative",
+                               "multiplier or active bit on a constraint that is not tight", "not stationary",
+                               "another pair is better", "not infeasible", "not invalid"},
+                              "unknown");
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 # The house checks refuse what they are for, and let a clean tree pass.
 set -u
 root=$(cd "$(dirname "$0")/../.." && pwd)
-tree=$(mktemp -d)
+tree=$(mktemp -d) || exit 1
 trap 'rm -rf "$tree"' EXIT
 failed=0
 fresh() {

@@ -1,6 +1,7 @@
 /// Vehicle, motors' bus and navigation sensors of a simulated flight, and who takes pictures on the way.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "platform/sitl/sensors/lidar.hpp"
 #include "platform/sitl/sensors/navigation_sensors.hpp"
 #include "platform/sitl/vehicle/vehicle.hpp"
+#include "platform/sitl/world/world.hpp"
 
 namespace roborun::sitl {
 
@@ -47,13 +49,21 @@ class SimulatedAircraft final : public flight::Aircraft {
         cameras_(cameras),
         far_side_(seed, outside),
         actuators_(minor_frame, far_side_.bus(), far_side_.kill_open(), far_side_.kill_closed()),
-        minor_frame_(minor_frame) {}
+        minor_frame_(minor_frame) {
+    vehicle_.set_ground(ground_W.z());
+  }
 
   /// All that can fail is connected to the line, which must outlive the aircraft.
   void connect(const FaultLine& line) noexcept {
     faults_ = &line;
     sensors_.connect(&line);
     far_side_.connect(&line);
+  }
+  /// From now on it stands on what is below it in this world, which also hides the sky from its receiver and must outlive
+  /// it; without one, on a plane at the height of its start.
+  void stand_in(const World& world) noexcept {
+    world_ = &world;
+    sensors_.stand_in(world);
   }
   /// A twin for tests: the kill switch has no effect.
   void ignore_kill_switch() noexcept { actuators_.ignore_kill_switch(); }
@@ -66,6 +76,7 @@ class SimulatedAircraft final : public flight::Aircraft {
     for (int i = 0; i < 40 && now_ < now; ++i) {
       // What was sent at the end of a minor frame reaches the motors in the middle of the next one: four
       // throttles are on the bus for 0.13 ms, and an ESC has a cycle of its own.
+      find_ground();
       vehicle_.step(minor_frame_ / 2);
       far_side_.advance(now_ + minor_frame_ / 2, vehicle_.state().battery_ratio, vehicle_);
       vehicle_.step(minor_frame_ / 2);
@@ -95,6 +106,17 @@ class SimulatedAircraft final : public flight::Aircraft {
   void set_mean_wind(const Vector3& mean_W_mps) noexcept { vehicle_.set_mean_wind(mean_W_mps); }
 
  private:
+  void find_ground() noexcept {
+    if (world_ == nullptr) return;
+    // Looked for from a little above: legs that give way sink into what they stand on. What is inside of an obstacle
+    // falls to the ground it was over before.
+    constexpr double kAbove_m = 1e-3;
+    const double ground_m = vehicle_.ground_m();
+    Vector3 from_W = vehicle_.state().p_WB;
+    from_W.z() = std::max(from_W.z(), ground_m) + kAbove_m;
+    const double below_m = world_->ground_below_m(from_W);
+    if (below_m < from_W.z()) vehicle_.set_ground(below_m);
+  }
   [[nodiscard]] FaultKind fault_of(Component component) const noexcept {
     return faults_ != nullptr ? faults_->of(component) : FaultKind::kNone;
   }
@@ -113,6 +135,7 @@ class SimulatedAircraft final : public flight::Aircraft {
   Nanos minor_frame_;
   MonotonicTime now_{};
   const FaultLine* faults_{nullptr};
+  const World* world_{nullptr};
 };
 
 }  // namespace roborun::sitl

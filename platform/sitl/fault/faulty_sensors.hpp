@@ -18,6 +18,7 @@ class FaultySensors final : public firmware_if::Imu, public firmware_if::Gnss, p
       : sensors_(sensors) {}
   /// Null: none. It must outlive the sensors.
   void connect(const FaultLine* faults) noexcept { faults_ = faults; }
+  void stand_in(const World& world) noexcept { sensors_.stand_in(&world); }
   void sample(MonotonicTime now, const VehicleState& state) noexcept {
     now_ = now;
     sensors_.sample(now, state);

@@ -14,6 +14,8 @@ CameraSpec DepthCameraConfig::spec() const noexcept {
   spec.range_m = range_m;
   spec.rate_Hz = rate_Hz;
   spec.latency_s = latency_s;
+  spec.model = model;
+  spec.invalid_ratio = invalid_ratio;
   return spec;
 }
 
@@ -25,7 +27,10 @@ SimulatedDepthCamera::SimulatedDepthCamera(const World& world, const CameraSpec&
       noise_(noise),
       seed_(seed),
       camera_(camera),
-      exposures_({spec.rate_Hz, spec.latency_s, noise.frame_dropout_ratio, seed, 0x1000U + camera}, mount) {
+      exposures_({spec.rate_Hz, spec.latency_s, noise.frame_dropout_ratio, seed, 0x1000U + camera,
+                  spec.model == CameraModel::kClean ? TimingErrors{} : DepthModel{}.timing},
+                 mount) {
+  if (spec.model != CameraModel::kClean) effects_.emplace(spec, seed, camera);
   const std::size_t width = spec.width, height = spec.height;
   image_.resize(width * height);
   ray_C_.reserve(width * height);
@@ -43,8 +48,11 @@ SimulatedDepthCamera::SimulatedDepthCamera(const World& world, const CameraSpec&
 Status SimulatedDepthCamera::read(firmware_if::DepthFrame& frame) noexcept {
   const Exposure* e = exposures_.take();
   if (e == nullptr) return Status::kNotReady;
-  render(*e);
-  frame = {e->stamp,
+  if (effects_)
+    render_product(*e, *effects_);
+  else
+    render(*e);
+  frame = {e->said,
            e->sequence,
            spec_.width,
            spec_.height,
@@ -73,6 +81,20 @@ void SimulatedDepthCamera::render(const Exposure& e) noexcept {
     if (depth_m <= spec_.range_min_m) depth_m = std::numeric_limits<double>::quiet_NaN();
     image_[i] = static_cast<float>(depth_m);
   }
+}
+
+void SimulatedDepthCamera::render_product(const Exposure& e, DepthEffects& effects) noexcept {
+  const Pose X_WC = effects.true_pose(e.X_WS);
+  for (std::size_t i = 0; i < ray_C_.size(); ++i) {
+    const double length = ray_C_[i].norm();
+    const Vector3 direction_W = (X_WC.R_RT * ray_C_[i]) / length;
+    image_[i] = static_cast<float>(
+        world_.hit_distance_m(X_WC.p_RT, direction_W, effects.reach_m() * length, e.stamp) / length);
+  }
+  effects.apply(e, X_WC, ray_C_, image_);
+  for (float& depth_m : image_)
+    if (!(static_cast<double>(depth_m) > spec_.range_min_m))
+      depth_m = std::numeric_limits<float>::quiet_NaN();
 }
 
 std::array<firmware_if::CameraMount, 6> six_camera_mounts() noexcept {

@@ -1,14 +1,15 @@
-/// A simulated depth camera: ray-cast, with noise that grows with depth, dropouts and latency.
+/// A simulated depth camera: ray-cast, with noise that grows with depth, dropouts and latency; or with the errors of a product.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/geometry/vector.hpp"
 #include "core/sensor_rig.hpp"
 #include "firmware_if/depth_camera.hpp"
+#include "platform/sitl/sensors/depth_effects.hpp"
 #include "platform/sitl/sensors/exposures.hpp"
 #include "platform/sitl/world/world.hpp"
 
@@ -31,10 +32,13 @@ struct DepthCameraConfig : DepthNoise {
   double tan_half_fov_ratio{1.0};  ///< (0, 2]. 90 degrees.
   double rate_Hz{20.0};            ///< [1, 100].
   double latency_s{0.030};         ///< [0, 1]. Exposure, transfer and depth computation.
+  CameraModel model{};             ///< All but kClean: no pixel has `noise_*` and `pixel_dropout_ratio`.
+  double invalid_ratio{CameraSpec{}.invalid_ratio};
 
   [[nodiscard]] CameraSpec spec() const noexcept;
 };
 
+/// `clean`, by the spec's model: white noise of `DepthNoise` on the true depth. The others: depth_effects.hpp.
 /// Frames are rendered only when somebody reads them; their noise depends on (seed, camera, sequence, pixel)
 /// alone, so what is read never depends on what was read before.
 class SimulatedDepthCamera final : public firmware_if::DepthCamera {
@@ -46,12 +50,13 @@ class SimulatedDepthCamera final : public firmware_if::DepthCamera {
       : SimulatedDepthCamera(world, config.spec(), mount, config, seed, camera) {}
 
   /// To be called at every minor frame with the true pose; takes an exposure when one is due.
-  void expose(MonotonicTime now, const Pose& X_WB) noexcept { exposures_.expose(now, X_WB); }
+  void expose(MonotonicTime now, const Pose& X_WB) noexcept { (void)exposures_.expose(now, X_WB); }
   [[nodiscard]] Status read(firmware_if::DepthFrame& frame) noexcept override;
   [[nodiscard]] const firmware_if::CameraMount& mount() const noexcept override { return exposures_.mount(); }
 
  private:
   void render(const Exposure& exposure) noexcept;
+  void render_product(const Exposure& exposure, DepthEffects& effects) noexcept;
 
   const World& world_;
   CameraSpec spec_;
@@ -60,6 +65,7 @@ class SimulatedDepthCamera final : public firmware_if::DepthCamera {
   std::uint32_t camera_;
   std::vector<Vector3> ray_C_;  ///< Per pixel, x component 1.
   std::vector<float> image_;
+  std::optional<DepthEffects> effects_;  ///< None: clean.
   Exposures exposures_;
 };
 

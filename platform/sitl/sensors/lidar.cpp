@@ -7,6 +7,7 @@
 #include <limits>
 #include <sstream>
 
+#include "core/geometry/camera_pose.hpp"
 #include "core/random/counter_rng.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
@@ -75,7 +76,8 @@ SimulatedLidar::SimulatedLidar(const World& world, const LidarSpec& spec,
       noise_(noise),
       seed_(seed),
       lidar_(lidar),
-      exposures_({spec.rate_Hz, spec.latency_s, noise.sweep_dropout_ratio, seed, 0x2000U + lidar},
+      exposures_({spec.rate_Hz, spec.latency_s, noise.sweep_dropout_ratio, seed, 0x2000U + lidar,
+                  spec.model == LidarModel::kClean ? TimingErrors{} : errors_of(spec.model).timing},
                  camera_mount(spec.mount)) {
   for (const LidarRay& ray : pattern) ray_L_.push_back(direction(ray));
   for (int ring = 0; pattern.empty() && ring < spec.rings; ++ring) {
@@ -85,13 +87,45 @@ SimulatedLidar::SimulatedLidar(const World& world, const LidarSpec& spec,
       ray_L_.push_back(direction({360.0 * column / spec.columns, elevation_deg}));
   }
   point_L_m_.resize(ray_L_.size());
+  if (spec.model == LidarModel::kClean) return;
+  effects_.emplace(errors_of(spec.model), noise.rain_mmph, seed, lidar);
+  columns_ = pattern.empty() ? spec.columns : ray_L_.size();
+  ring_step_rad_ =
+      spec.rings > 1 ? (spec.highest_deg - spec.lowest_deg) / (spec.rings - 1) * core::kPi / 180.0 : 0.0;
+  motion_.resize(Exposures::kRing);
+}
+
+void SimulatedLidar::expose(MonotonicTime now, const Pose& X_WB) noexcept {
+  if (effects_) remember(now, X_WB);
+  const bool taken = exposures_.expose(now, X_WB);
+  if (!taken || !effects_) return;
+  SweepMotion& motion = motion_[exposures_.taken() % Exposures::kRing];
+  motion = recent_;
+  // A sweep ends with where the vehicle is now; the knots before it are those of whole parts of a turn.
+  motion.X_WL.back() = X_WB;
+  for (Pose& X : motion.X_WL) X = effects_->true_pose(core::camera_pose(X, mount()));
+}
+
+void SimulatedLidar::remember(MonotonicTime now, const Pose& X_WB) noexcept {
+  if (now < next_knot_) return;
+  auto& knots = recent_.X_WL;
+  if (next_knot_ == MonotonicTime{}) {
+    knots.fill(X_WB);
+    next_knot_ = now;
+  }
+  next_knot_ += from_seconds(1.0 / (spec_.rate_Hz * (SweepMotion::kKnots - 1)));
+  std::copy(knots.begin() + 1, knots.end(), knots.begin());
+  knots.back() = X_WB;
 }
 
 Status SimulatedLidar::read(firmware_if::LidarSweep& sweep) noexcept {
   const Exposure* e = exposures_.take();
   if (e == nullptr) return Status::kNotReady;
-  cast(*e);
-  sweep = {e->stamp, e->sequence, static_cast<float>(spec_.range_min_m), static_cast<float>(spec_.range_m),
+  if (effects_)
+    cast_product(*e, *effects_);
+  else
+    cast(*e);
+  sweep = {e->said, e->sequence, static_cast<float>(spec_.range_min_m), static_cast<float>(spec_.range_m),
            std::span(point_L_m_).first(points_)};
   return Status::kOk;
 }
@@ -112,6 +146,37 @@ void SimulatedLidar::cast(const Exposure& e) noexcept {
       if (range_m <= spec_.range_min_m) continue;
     }
     const Vector3 p_L = range_m * ray_L;
+    point_L_m_[points_++] = {static_cast<float>(p_L.x()), static_cast<float>(p_L.y()),
+                             static_cast<float>(p_L.z())};
+  }
+}
+
+void SimulatedLidar::cast_product(const Exposure& e, const LidarEffects& effects) noexcept {
+  const LidarErrors& errors = effects.errors();
+  const SweepMotion& motion = motion_[e.sequence % Exposures::kRing];
+  const Pose X_WL = motion.at(1.0);
+  core::CounterRng rng(seed_, ((kStream + lidar_) << 40U) + e.sequence);
+  // Each sweep turned by the golden angle: never between the same rays again, evenly over time.
+  const double turn_rad = errors.non_repeating ? 2.39996322972865332 * e.sequence : 0.0;
+  const double sine = core::sin(turn_rad), cosine = core::cos(turn_rad);
+  const double angle_rad = errors.angle_deg * core::kPi / 180.0;
+  const double tilt_rad = errors.non_repeating ? ring_step_rad_ * (rng.uniform() - 0.5) : 0.0;
+  points_ = 0;
+  for (std::size_t i = 0; i < ray_L_.size(); ++i) {
+    const double share = static_cast<double>(i % columns_ + 1) / static_cast<double>(columns_);
+    const Vector3& r = ray_L_[i];
+    const Vector3 level(cosine * r.x() - sine * r.y(), sine * r.x() + cosine * r.y(), 0.0);
+    const std::uint64_t bits = rng.next();
+    const double up_rad = angle_rad * bounded_normal(bits);
+    const double aside_rad = angle_rad * bounded_normal(core::mix64(bits));
+    const Vector3 said_L = Vector3(level.x(), level.y(), r.z() + tilt_rad).normalized();
+    const Vector3 ray_L =
+        (said_L + Vector3(-aside_rad * said_L.y(), aside_rad * said_L.x(), up_rad)).normalized();
+    const Pose X_WR = motion.at(share);
+    const Echo echo = effects.measure(world_, X_WR, ray_L, spec_.range_m, e.stamp, rng);
+    if (!echo.there || !(echo.range_m > spec_.range_min_m)) continue;
+    const Vector3 p_R = echo.range_m * said_L;
+    const Vector3 p_L = p_R + errors.deskew_ratio * (X_WL.inverse_times(X_WR * p_R) - p_R);
     point_L_m_[points_++] = {static_cast<float>(p_L.x()), static_cast<float>(p_L.y()),
                              static_cast<float>(p_L.z())};
   }

@@ -1,18 +1,26 @@
-/// Simulated IMU, GNSS receiver and barometer: bias, noise, rate, latency and dropouts.
+/// Simulated IMU, GNSS receiver and barometer: bias, noise, rate, latency and dropouts; or the errors of products.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "core/random/counter_rng.hpp"
+#include "core/sensor_model.hpp"
 #include "firmware_if/barometer.hpp"
 #include "firmware_if/gnss.hpp"
 #include "firmware_if/imu.hpp"
 #include "platform/sitl/sensors/delay_line.hpp"
+#include "platform/sitl/sensors/navigation_models.hpp"
+#include "platform/sitl/sensors/surface_lattice.hpp"
 #include "platform/sitl/vehicle/vehicle.hpp"
+#include "platform/sitl/world/world.hpp"
 
 namespace roborun::sitl {
 
+/// The numbers are those of `clean`; the models have their own (navigation_models.hpp).
 struct NavigationSensorsConfig {
+  ImuModel imu{};
+  GnssModel gnss{};
   // IMU: an industrial MEMS part (ADIS16470 class), one sample a minor frame.
   double gyro_noise_radps{0.0012};  ///< One sigma a sample at 400 Hz.
   double gyro_bias_radps{0.002};    ///< One sigma at switch-on.
@@ -34,12 +42,17 @@ struct NavigationSensorsConfig {
   double barometer_wander_m{0.30};  ///< Slow drift, one sigma, correlated over 120 s.
 };
 
+/// Share of 16 directions, 20 and 50 degrees above the horizon, in which nothing stands within 80 m; 1 in the open.
+[[nodiscard]] double sky_ratio(const World& world, const Vector3& p_W) noexcept;
+
 class NavigationSensors final : public firmware_if::Imu,
                                 public firmware_if::Gnss,
                                 public firmware_if::Barometer {
  public:
   NavigationSensors(const NavigationSensorsConfig& config, std::uint64_t seed) noexcept;
 
+  /// What hides the sky from the receiver; null: nothing. It must outlive the sensors.
+  void stand_in(const World* world) noexcept { world_ = world; }
   /// To be called once a minor frame with the true state.
   void sample(MonotonicTime now, const VehicleState& state) noexcept;
   [[nodiscard]] Status read(firmware_if::ImuSample& sample) noexcept override {
@@ -54,8 +67,30 @@ class NavigationSensors final : public firmware_if::Imu,
   void sample_imu(const VehicleState& state) noexcept;
   void sample_gnss(const VehicleState& state) noexcept;
   void sample_barometer(const VehicleState& state) noexcept;
+  void sample_product_imu(const VehicleState& state, firmware_if::ImuSample& sample) noexcept;
+  void sample_product_gnss(const VehicleState& state) noexcept;
+  [[nodiscard]] double compass_rad(const VehicleState& state) noexcept;
+
+  /// What a product of this kind has for life.
+  struct Build {
+    Vector3 gyro_scale, accel_scale, gyro_misalignment, accel_misalignment;
+    std::array<double, 3> compass_rad;  ///< Constant, by sine of the heading, by sine of twice the heading.
+    std::array<double, 2> compass_phase_rad;
+    double compass_current_rad;
+    std::array<Vector3, 4> shake;  ///< Direction in which each rotor shakes, of length 1.
+  };
 
   NavigationSensorsConfig config_;
+  ImuErrors imu_errors_{};
+  GnssErrors gnss_errors_{};
+  const World* world_{nullptr};
+  Build build_{};
+  std::array<double, 4> rotor_rad_{};
+  Vector3 drift_W_m_ = Vector3::Zero();
+  Vector3 multipath_{Vector3::Zero()};  ///< Of sigma 1.
+  double place_deg_{0.0};               ///< What the place does to the compass.
+  SurfaceLattice lattice_;
+  MonotonicTime last_imu_{};
   core::CounterRng imu_rng_;
   core::CounterRng gnss_rng_;
   core::CounterRng barometer_rng_;

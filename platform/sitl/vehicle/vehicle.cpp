@@ -68,7 +68,7 @@ void Vehicle::substep(double dt_s) noexcept {
   const Vector3 w_dot = (torque_B_Nm - model_.drag_angular_Nms * s.w_WB_B - s.w_WB_B.cross(momentum))
                             .cwiseQuotient(inertia_kgm2);
 
-  s.on_ground = s.p_WB.z() <= 0.0 && s.a_WB.z() <= 0.0;
+  s.on_ground = s.p_WB.z() <= ground_m_ && s.a_WB.z() <= 0.0;
   if (s.on_ground && !s.v_WB.isZero(0.0)) {
     // The legs give way while they take up its speed: an accelerometer feels the touch-down.
     const Vector3 stop_W_mps2 = -s.v_WB / dt_s;
@@ -78,7 +78,7 @@ void Vehicle::substep(double dt_s) noexcept {
     s.w_WB_B.setZero();
   } else if (s.on_ground) {
     // They hold it: no sliding, no tipping over.
-    s.p_WB.z() = 0.0;
+    s.p_WB.z() = ground_m_;
     s.v_WB.setZero();
     s.a_WB.setZero();
     s.w_WB_B.setZero();

@@ -42,6 +42,9 @@ class Vehicle final : public firmware_if::Motors {
   /// Advances by dt in substeps of at most 1.25 ms. An empty battery gives no thrust.
   void step(Nanos dt) noexcept;
   [[nodiscard]] const VehicleState& state() const noexcept { return state_; }
+  /// Height of the surface below it, on which it can stand; 0 until then.
+  void set_ground(double ground_m) noexcept { ground_m_ = ground_m; }
+  [[nodiscard]] double ground_m() const noexcept { return ground_m_; }
   /// From now on; gusts go on where they are.
   void set_mean_wind(const Vector3& mean_W_mps) noexcept { wind_.mean_W_mps = mean_W_mps; }
   [[nodiscard]] Pose X_WB() const noexcept { return {state_.q_WB.toRotationMatrix(), state_.p_WB}; }
@@ -55,6 +58,7 @@ class Vehicle final : public firmware_if::Motors {
   VehicleModel model_;
   WindConfig wind_;
   VehicleState state_;
+  double ground_m_{0.0};
   firmware_if::MotorCommand command_{};
   Vector3 gust_W_mps_ = Vector3::Zero();
   Vector3 wind_W_mps_ = Vector3::Zero();

@@ -1,9 +1,21 @@
 #include "platform/sitl/world/body_reader.hpp"
 
+#include <array>
+
 namespace roborun::sitl {
 namespace {
 
 constexpr std::size_t kMost = 1000;
+constexpr std::array<WorldKey, 5> kBodyKeys{
+    {{"body", "radius", "m, above 0, at most 100", {}, "of a sphere, or of an upright cylinder"},
+     {"body", "height", "m, 0 .. 1000", 0.0, "of the cylinder; 0: a sphere"},
+     {"body", "speed", "m/s, 0 .. 50", 0.0, "constant, along its path"},
+     {"body", "at_s", "s, 0 .. 7200", 0.0, "until then it waits at its first point"},
+     {"body",
+      "path",
+      "[[x, y, z], ...], m",
+      {},
+      "of its centre, one to 1000 points; it stays at the last one"}}};
 
 double number_within(const input::TomlReader& reader, const toml::table& table, const char* key,
                      double fallback, double high) {
@@ -15,6 +27,8 @@ double number_within(const input::TomlReader& reader, const toml::table& table, 
 
 }  // namespace
 
+std::span<const WorldKey> body_keys() noexcept { return kBodyKeys; }
+
 std::vector<Body> read_bodies(const input::TomlReader& reader, const toml::table& root) {
   std::vector<Body> bodies;
   const toml::node* list = root.get("body");
@@ -23,7 +37,7 @@ std::vector<Body> read_bodies(const input::TomlReader& reader, const toml::table
   for (const toml::node& node : *list->as_array()) {
     const toml::table* table = node.as_table();
     if (table == nullptr) reader.refuse(node, "body", "must be written as [[body]]");
-    reader.allow_keys(*table, "[[body]]", {"radius", "height", "speed", "at_s", "path"});
+    reader.allow_keys(*table, "[[body]]", keys_of(kBodyKeys, "body"));
     Body body;
     const toml::node& radius = reader.need(*table, "radius", "[[body]]");
     body.radius_m = number_within(reader, *table, "radius", 0.0, 100.0);

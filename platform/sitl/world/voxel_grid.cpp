@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 namespace roborun::sitl {
 namespace {
@@ -17,6 +18,8 @@ VoxelGrid::VoxelGrid(const Vector3& min_W, double cell_m, const std::array<std::
     : min_W_(min_W), cell_m_(cell_m), count_(count) {
   const auto total = static_cast<std::size_t>(count[0] * count[1] * count[2]);
   bits_.assign((total + 63) / 64, 0);
+  for (std::size_t i = 0; i < 3; ++i) block_count_[i] = (count[i] + kBlock - 1) / kBlock;
+  block_.assign(static_cast<std::size_t>(block_count_[0] * block_count_[1] * block_count_[2]), false);
 }
 
 void VoxelGrid::fill(const std::array<std::int64_t, 3>& first, std::int64_t size) {
@@ -31,6 +34,8 @@ void VoxelGrid::fill(const std::array<std::int64_t, 3>& first, std::int64_t size
       for (std::int64_t x = low[0]; x < high[0]; ++x) {
         const auto bit = static_cast<std::size_t>((z * count_[1] + y) * count_[0] + x);
         bits_[bit / 64] |= std::uint64_t{1} << (bit % 64);
+        const std::int64_t row = z / kBlock * block_count_[1] + y / kBlock;
+        block_[static_cast<std::size_t>(row * block_count_[0] + x / kBlock)] = true;
       }
     }
   }
@@ -99,24 +104,56 @@ double VoxelGrid::hit_distance_m(const Vector3& origin_W, const Vector3& directi
   return kInfinity;
 }
 
+double VoxelGrid::clearance_in_block_m(const std::array<std::int64_t, 3>& block, const Vector3& p_W,
+                                       double best_m) const noexcept {
+  const auto distance_m = [&](const std::array<std::int64_t, 3>& first, double size) {
+    const Vector3 corner =
+        min_W_ + cell_m_ * Vector3(static_cast<double>(first[0]), static_cast<double>(first[1]),
+                                   static_cast<double>(first[2]));
+    return (p_W - p_W.cwiseMax(corner).cwiseMin(corner + Vector3::Constant(size * cell_m_))).norm();
+  };
+  const std::array<std::int64_t, 3> low{block[0] * kBlock, block[1] * kBlock, block[2] * kBlock};
+  if (distance_m(low, static_cast<double>(kBlock)) >= best_m) return best_m;
+  for (std::int64_t z = low[2]; z < low[2] + kBlock; ++z) {
+    for (std::int64_t y = low[1]; y < low[1] + kBlock; ++y) {
+      for (std::int64_t x = low[0]; x < low[0] + kBlock; ++x)
+        if (occupied(x, y, z)) best_m = std::min(best_m, distance_m({x, y, z}, 1.0));
+    }
+  }
+  return best_m;
+}
+
 double VoxelGrid::clearance_m(const Vector3& p_W, double cap_m) const noexcept {
   if (bits_.empty()) return cap_m;
-  std::array<std::int64_t, 3> low{};
-  std::array<std::int64_t, 3> high{};
+  const double size_m = static_cast<double>(kBlock) * cell_m_;
+  std::array<std::int64_t, 3> middle{};
+  std::int64_t last = 0;  // the shell of the farthest block
   for (std::size_t i = 0; i < 3; ++i) {
     const auto axis = static_cast<Eigen::Index>(i);
-    low[i] = std::max<std::int64_t>(index_of(p_W[axis] - cap_m, min_W_[axis], cell_m_), 0);
-    high[i] = std::min<std::int64_t>(index_of(p_W[axis] + cap_m, min_W_[axis], cell_m_), count_[i] - 1);
+    middle[i] = index_of(p_W[axis], min_W_[axis], size_m);
+    last = std::max({last, std::abs(middle[i]), std::abs(block_count_[i] - 1 - middle[i])});
   }
+  // Shell after shell of blocks around the point's own: those of shell n are at least n - 1 blocks away.
   double best_m = cap_m;
-  for (std::int64_t z = low[2]; z <= high[2]; ++z) {
-    for (std::int64_t y = low[1]; y <= high[1]; ++y) {
-      for (std::int64_t x = low[0]; x <= high[0]; ++x) {
-        if (!occupied(x, y, z)) continue;
-        const Vector3 corner = min_W_ + cell_m_ * Vector3(static_cast<double>(x), static_cast<double>(y),
-                                                          static_cast<double>(z));
-        const Vector3 nearest = p_W.cwiseMax(corner).cwiseMin(corner + Vector3::Constant(cell_m_));
-        best_m = std::min(best_m, (p_W - nearest).norm());
+  for (std::int64_t shell = 0; shell <= last && static_cast<double>(shell - 1) * size_m < best_m; ++shell) {
+    std::array<std::int64_t, 3> low{};
+    std::array<std::int64_t, 3> high{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      low[i] = std::max<std::int64_t>(middle[i] - shell, 0);
+      high[i] = std::min<std::int64_t>(middle[i] + shell, block_count_[i] - 1);
+    }
+    for (std::int64_t z = low[2]; z <= high[2]; ++z) {
+      for (std::int64_t y = low[1]; y <= high[1]; ++y) {
+        const bool face = std::abs(z - middle[2]) == shell || std::abs(y - middle[1]) == shell;
+        for (std::int64_t x = low[0]; x <= high[0]; ++x) {
+          // Inside of the shell all has been looked at: on to its far side.
+          if (!face && x > middle[0] - shell && x < middle[0] + shell) {
+            if (middle[0] + shell > high[0]) break;
+            x = middle[0] + shell;
+          }
+          if (block_[static_cast<std::size_t>((z * block_count_[1] + y) * block_count_[0] + x)])
+            best_m = clearance_in_block_m({x, y, z}, p_W, best_m);
+        }
       }
     }
   }

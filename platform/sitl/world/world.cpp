@@ -87,6 +87,31 @@ Aabb extent_of(const Pillar& p) noexcept {
           Vector3(p.x_m + p.radius_m, p.y_m + p.radius_m, p.top_m)};
 }
 
+Aabb extent_of(const Ball& ball) noexcept { return Aabb::around(ball.center_W, ball.radius_m); }
+
+Aabb extent_of(const Turned& turned) noexcept {
+  const Aabb* box = std::get_if<Aabb>(&turned.shape_S);
+  const Aabb own = box != nullptr ? *box : extent_of(std::get<Pillar>(turned.shape_S));
+  const Vector3 center_W = turned.X_WS * own.center();
+  const Vector3 half_m = turned.X_WS.R_RT.cwiseAbs() * (0.5 * own.size());
+  return {center_W - half_m, center_W + half_m};
+}
+
+double hit_turned_m(const Turned& turned, const Vector3& o_W, const Vector3& d_W) noexcept {
+  const Vector3 o_S = turned.X_WS.inverse_times(o_W);
+  const Vector3 d_S = turned.X_WS.R_RT.transpose() * d_W;
+  const Aabb* box = std::get_if<Aabb>(&turned.shape_S);
+  return box != nullptr ? hit_box_m(*box, o_S, d_S)
+                        : hit_pillar_m(std::get<Pillar>(turned.shape_S), o_S, d_S);
+}
+
+double turned_distance_m(const Turned& turned, const Vector3& p_W) noexcept {
+  const Vector3 p_S = turned.X_WS.inverse_times(p_W);
+  const Aabb* box = std::get_if<Aabb>(&turned.shape_S);
+  return box != nullptr ? box_distance_m(*box, p_S)
+                        : pillar_distance_m(std::get<Pillar>(turned.shape_S), p_S);
+}
+
 }  // namespace
 
 Vector3 Body::center_W(MonotonicTime when) const noexcept {
@@ -98,6 +123,20 @@ Vector3 Body::center_W(MonotonicTime when) const noexcept {
     left_m -= length_m;
   }
   return path_W.back();
+}
+
+Aabb extent_W(const WorldDescription& world) noexcept {
+  Aabb all{Vector3::Constant(kInfinity), Vector3::Constant(-kInfinity)};
+  const auto add = [&all](const Aabb& box) {
+    all = {all.min_W.cwiseMin(box.min_W), all.max_W.cwiseMax(box.max_W)};
+  };
+  for (const Pillar& pillar : world.pillars) add(extent_of(pillar));
+  for (const Aabb& box : world.boxes) add(box);
+  for (const Ball& ball : world.balls) add(extent_of(ball));
+  for (const Turned& turned : world.turned) add(extent_of(turned));
+  if (!world.mesh.empty()) add(world.mesh.bounds_W());
+  if (!world.voxels.empty()) add(world.voxels.bounds_W());
+  return all;
 }
 
 World::World(WorldDescription description) : description_(std::move(description)) {
@@ -118,6 +157,8 @@ World::World(WorldDescription description) : description_(std::move(description)
   std::vector<Aabb> extents;
   for (const Pillar& pillar : description_.pillars) extents.push_back(extent_of(pillar));
   extents.insert(extents.end(), description_.boxes.begin(), description_.boxes.end());
+  for (const Ball& ball : description_.balls) extents.push_back(extent_of(ball));
+  for (const Turned& turned : description_.turned) extents.push_back(extent_of(turned));
 
   // One column more on each side, so that a ray that starts at the border meets a square.
   grid_min_W_ = b.min_W - Vector3::Constant(kColumn_m);
@@ -148,15 +189,34 @@ std::size_t World::column(std::int64_t ix, std::int64_t iy) const noexcept {
 
 double World::hit_object_m(std::uint32_t object, const Vector3& origin_W,
                            const Vector3& direction_W) const noexcept {
-  const std::size_t pillar_count = description_.pillars.size();
-  return object < pillar_count ? hit_pillar_m(description_.pillars[object], origin_W, direction_W)
-                               : hit_box_m(description_.boxes[object - pillar_count], origin_W, direction_W);
+  const WorldDescription& d = description_;
+  std::size_t i = object;
+  if (i < d.pillars.size()) return hit_pillar_m(d.pillars[i], origin_W, direction_W);
+  i -= d.pillars.size();
+  if (i < d.boxes.size()) return hit_box_m(d.boxes[i], origin_W, direction_W);
+  i -= d.boxes.size();
+  if (i < d.balls.size())
+    return hit_sphere_m(d.balls[i].center_W, d.balls[i].radius_m, origin_W, direction_W);
+  return hit_turned_m(d.turned[i - d.balls.size()], origin_W, direction_W);
+}
+
+double World::object_distance_m(std::uint32_t object, const Vector3& p_W) const noexcept {
+  const WorldDescription& d = description_;
+  std::size_t i = object;
+  if (i < d.pillars.size()) return pillar_distance_m(d.pillars[i], p_W);
+  i -= d.pillars.size();
+  if (i < d.boxes.size()) return box_distance_m(d.boxes[i], p_W);
+  i -= d.boxes.size();
+  if (i < d.balls.size()) return std::max((p_W - d.balls[i].center_W).norm() - d.balls[i].radius_m, 0.0);
+  return turned_distance_m(d.turned[i - d.balls.size()], p_W);
 }
 
 double World::hit_distance_m(const Vector3& origin_W, const Vector3& direction_W,
                              double max_m) const noexcept {
   double best_m = description_.voxels.hit_distance_m(origin_W, direction_W, max_m);
-  if (direction_W.z() < 0.0) best_m = std::min(best_m, std::max(origin_W.z(), 0.0) / -direction_W.z());
+  best_m = std::min(best_m, description_.mesh.hit_distance_m(origin_W, direction_W, max_m));
+  if (direction_W.z() < 0.0)
+    best_m = std::min(best_m, std::max(origin_W.z() - description_.ground_m, 0.0) / -direction_W.z());
   best_m = std::min(best_m, max_m);
   bool hit = best_m < max_m;
 
@@ -197,7 +257,7 @@ double World::hit_distance_m(const Vector3& origin_W, const Vector3& direction_W
 }
 
 double World::clearance_m(const Vector3& p_W, double cap_m) const noexcept {
-  double best_m = description_.voxels.clearance_m(p_W, cap_m);
+  double best_m = description_.mesh.clearance_m(p_W, description_.voxels.clearance_m(p_W, cap_m));
   const auto index = [](double raw, std::int64_t count) {
     return static_cast<std::int64_t>(std::clamp(std::floor(raw), 0.0, static_cast<double>(count - 1)));
   };
@@ -205,19 +265,19 @@ double World::clearance_m(const Vector3& p_W, double cap_m) const noexcept {
   const std::int64_t x1 = index((p_W.x() + cap_m - grid_min_W_.x()) / kColumn_m, nx_);
   const std::int64_t y0 = index((p_W.y() - cap_m - grid_min_W_.y()) / kColumn_m, ny_);
   const std::int64_t y1 = index((p_W.y() + cap_m - grid_min_W_.y()) / kColumn_m, ny_);
-  const std::size_t pillar_count = description_.pillars.size();
   for (std::int64_t y = y0; y <= y1; ++y) {
     for (std::int64_t x = x0; x <= x1; ++x) {
       const Range range = column_[column(x, y)];
-      for (std::uint32_t i = range.first; i < range.first + range.count; ++i) {
-        const std::uint32_t object = object_[i];
-        best_m = std::min(best_m, object < pillar_count
-                                      ? pillar_distance_m(description_.pillars[object], p_W)
-                                      : box_distance_m(description_.boxes[object - pillar_count], p_W));
-      }
+      for (std::uint32_t i = range.first; i < range.first + range.count; ++i)
+        best_m = std::min(best_m, object_distance_m(object_[i], p_W));
     }
   }
   return best_m;
+}
+
+double World::ground_below_m(const Vector3& p_W) const noexcept {
+  constexpr double kDeepest_m = 1e5;
+  return p_W.z() - hit_distance_m(p_W, -Vector3::UnitZ(), kDeepest_m);
 }
 
 void World::add(const std::vector<Body>& bodies) {

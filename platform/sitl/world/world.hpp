@@ -5,10 +5,13 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/geometry/vector.hpp"
 #include "firmware_if/time.hpp"
+#include "platform/sitl/world/triangle_mesh.hpp"
 #include "platform/sitl/world/voxel_grid.hpp"
 
 namespace roborun::sitl {
@@ -20,6 +23,17 @@ struct Pillar {
   double radius_m{};
   double bottom_m{0.0};
   double top_m{20.0};
+};
+
+struct Ball {
+  Vector3 center_W = Vector3::Zero();
+  double radius_m{};
+};
+
+/// A box or a cylinder that stands in its own frame S, and S in any way in the world.
+struct Turned {
+  Pose X_WS;
+  std::variant<Aabb, Pillar> shape_S;
 };
 
 /// A sphere, or an upright cylinder, that goes along its way-points at a constant speed and stays at the
@@ -34,16 +48,23 @@ struct Body {
   [[nodiscard]] Vector3 center_W(MonotonicTime when) const noexcept;
 };
 
-/// Everything a world is made of. The ground is the plane z = 0.
+/// Everything a world is made of.
 struct WorldDescription {
-  Aabb bounds_W{};  ///< Where the vehicle's centre may be.
+  Aabb bounds_W{};       ///< Where the vehicle's centre may be.
+  double ground_m{0.0};  ///< Height of the plane that is the ground; -infinity: there is none.
   Vector3 start_W = Vector3::Zero();
   Vector3 goal_W = Vector3::Zero();
   std::vector<Pillar> pillars;
   std::vector<Aabb> boxes;
+  std::vector<Ball> balls;
+  std::vector<Turned> turned;
+  TriangleMesh mesh;
   VoxelGrid voxels;
   std::vector<Body> bodies;
 };
+
+/// Box around all that does not move; empty (min above max) if there is nothing. The plane of the ground has no size.
+[[nodiscard]] Aabb extent_W(const WorldDescription& world) noexcept;
 
 class World {
  public:
@@ -56,8 +77,14 @@ class World {
   [[nodiscard]] const Vector3& goal_W() const noexcept { return description_.goal_W; }
   [[nodiscard]] const std::vector<Pillar>& pillars() const noexcept { return description_.pillars; }
   [[nodiscard]] const std::vector<Aabb>& boxes() const noexcept { return description_.boxes; }
+  [[nodiscard]] const std::vector<Ball>& balls() const noexcept { return description_.balls; }
+  [[nodiscard]] const std::vector<Turned>& turned() const noexcept { return description_.turned; }
+  [[nodiscard]] const TriangleMesh& mesh() const noexcept { return description_.mesh; }
   [[nodiscard]] const VoxelGrid& voxels() const noexcept { return description_.voxels; }
   [[nodiscard]] const std::vector<Body>& bodies() const noexcept { return description_.bodies; }
+  [[nodiscard]] double ground_m() const noexcept { return description_.ground_m; }
+  /// What it was made of, back.
+  [[nodiscard]] WorldDescription description() && noexcept { return std::move(description_); }
   void add(const std::vector<Body>& bodies);
 
   /// Distance along a unit direction to the first surface (obstacle or ground) of what does not move,
@@ -67,9 +94,12 @@ class World {
   /// The same with the bodies where they are at `when`.
   [[nodiscard]] double hit_distance_m(const Vector3& origin_W, const Vector3& direction_W, double max_m,
                                       MonotonicTime when) const noexcept;
-  /// Distance from a point to the nearest obstacle that does not move (the ground is none), at most cap_m; 0
-  /// inside an obstacle.
+  /// Distance from a point to the nearest obstacle that does not move (the plane of the ground is none), at most
+  /// cap_m; 0 inside an obstacle.
   [[nodiscard]] double clearance_m(const Vector3& p_W, double cap_m) const noexcept;
+  /// Height of the first surface or ground straight below the point, -infinity if there is none. A point inside of an
+  /// obstacle is over that obstacle's own surface: its own height.
+  [[nodiscard]] double ground_below_m(const Vector3& p_W) const noexcept;
   struct NearestBody {
     double distance_m{};               ///< To its surface; 0 inside.
     Vector3 core_W = Vector3::Zero();  ///< The nearest point of its axis, or its centre.
@@ -89,13 +119,14 @@ class World {
   [[nodiscard]] std::size_t column(std::int64_t ix, std::int64_t iy) const noexcept;
   [[nodiscard]] double hit_object_m(std::uint32_t object, const Vector3& origin_W,
                                     const Vector3& direction_W) const noexcept;
+  [[nodiscard]] double object_distance_m(std::uint32_t object, const Vector3& p_W) const noexcept;
 
   WorldDescription description_;
   Vector3 grid_min_W_ = Vector3::Zero();
   std::int64_t nx_{1};
   std::int64_t ny_{1};
   std::vector<Range> column_;          ///< Objects over each grid square, into object_.
-  std::vector<std::uint32_t> object_;  ///< Index of a pillar, or of a box + pillars().size().
+  std::vector<std::uint32_t> object_;  ///< Pillars, boxes, balls, turned: one number after the other.
 };
 
 }  // namespace roborun::sitl

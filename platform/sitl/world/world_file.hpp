@@ -5,31 +5,48 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "platform/sitl/world/world.hpp"
+#include "platform/sitl/world/world_key.hpp"
 
 namespace roborun::sitl {
 
-/// Where the mission goes, if the file does not say so or somebody wants it otherwise.
-struct Endpoints {
-  std::optional<Vector3> start_W;
-  std::optional<Vector3> goal_W;
+/// Cells of a point cloud where nobody says otherwise.
+inline constexpr double kCloudCell_m = 0.2;
+
+/// What the file does not say, or somebody wants otherwise.
+struct WorldOptions {
+  std::optional<Vector3> start_W{};
+  std::optional<Vector3> goal_W{};
+  std::optional<Aabb> bounds_W{};    ///< Where the vehicle's centre may be.
+  std::optional<double> ground_m{};  ///< Height of the plane that is the ground.
+  std::optional<double> cell_m{};    ///< Of point clouds; none: kCloudCell_m.
+  double scale{1.0};                 ///< All lengths of the file times this; not of TOML.
+  bool surfaces{false};              ///< Meshes need not be closed.
+  double radius_m{0.6};              ///< Start and goal must be free for a sphere of this size.
 };
 
-/// By extension: .toml, .bt or .ot. Throws InputError (file, line, key, what would be right) for anything
-/// that is not a valid world: unreadable, too large (64 MiB), unknown keys, wrong types, numbers not finite,
-/// start or goal occupied or out of bounds.
+/// By the end of its name: .toml, .bt, .ot, .world, .sdf, .pcd, .ply, .las, .stl, .obj or .dae. Throws InputError (file,
+/// line, key, what would be right) for anything that is not a valid world: unreadable, too large (64 MiB; clouds and
+/// meshes 1 GiB), of another format than its name says, damaged, unknown keys, wrong types, numbers not finite, start
+/// or goal occupied or out of bounds, no ground below the start.
 ///
-/// TOML: tables [world] with bounds = [[x, y, z], [x, y, z]], start = [x, y, z], goal = [x, y, z], and any
-/// number of
-///   [[pillar]] with x, y, radius, optional bottom (0) and top (20), and [[box]] with min = [x, y, z], max =
-///   [x, y, z]; metres, at most 100,000 objects; and [[body]], which moves
-///   (body_reader.hpp).
+/// TOML: the keys of world_keys(), metres, at most 100,000 pillars, 100,000 boxes and 1,000 bodies. The ground is
+///   z = 0.
 /// OctoMap: every leaf that its log-odds call occupied becomes solid; the bounds are the box around all
-/// leaves, from
-///   0.5 m above its floor; start and goal default to the free-most points near the two ends of the longer
-///   side, at the middle height.
-[[nodiscard]] World load_world(const std::string& path, const Endpoints& endpoints);
+///   leaves, from 0.5 m above its lowest. The ground is the lowest leaf, or z = 0 if that is lower.
+/// SDF (sdf_file.hpp): shapes stay exact; planes are the ground, and what stands under the start is.
+/// Point clouds (cloud_file.hpp): each cell with a point is solid. Positions farther than 20 km from the origin (maps in
+///   national grids) are counted from the lowest corner of all.
+/// Meshes (mesh_file.hpp, and PLY files with faces): surfaces, which must be closed unless `surfaces`.
+/// The last three: bounds are the box around everything, from 0.5 m above the lowest or the ground, and wide enough
+/// for given ends. Start and goal default (but for TOML) to the free-most points near the two ends of the longer
+/// side, at the middle height.
+[[nodiscard]] World load_world(const std::string& path, const WorldOptions& options);
+
+/// Every key of a TOML world: the only ones that load_world() takes.
+[[nodiscard]] std::vector<WorldKey> world_keys();
 
 /// The occupied space of an OctoMap file in memory (.ot if `full`, otherwise .bt). Iterative, at most 16
 /// levels deep, and never allocates more than the bytes justify; refuses what is truncated, too long or not

@@ -275,5 +275,58 @@ TEST(Node, RefusesAConfigThatCannotWork) {
   EXPECT_EQ((Node::Config{.command_period = milliseconds{2}}.validate()), Status::kInvalidArgument);
 }
 
+TEST(Node, CountsABusThatFailsAndGoesOn) {
+  Rig rig;
+  rig.bus.hears = Status::kIo;
+  EXPECT_EQ(rig.sut.step(rig.now, rig.in), Status::kIo);
+  EXPECT_EQ(rig.sut.counters().bus_errors, 1U);
+  rig.bus.hears = Status::kOk;
+  say(rig.bus, NodeStatus{}, 42, 0, rig.now);
+  rig.run(milliseconds{3});
+  EXPECT_TRUE(rig.sut.online(42, rig.now));
+  EXPECT_EQ(rig.sut.counters().bus_errors, 1U);
+}
+
+/// A single frame has no CRC: what is too short for its type comes through to the decoder.
+TEST(Node, CountsWhatCannotBeDecodedAndKeepsTheLast) {
+  Rig rig;
+  const auto stump = [&](std::uint16_t type, std::uint8_t source, std::uint8_t transfer_id) {
+    CanFrame frame;
+    frame.id = 0x10000000U | std::uint32_t{type} << 8U | source;
+    frame.size = 2;
+    frame.data[1] = static_cast<std::uint8_t>(0xc0U | transfer_id);
+    frame.stamp = rig.now;
+    rig.bus.incoming.push_back(frame);
+  };
+  say(rig.bus, HardpointStatus{.hardpoint_id = 1}, 35, 0, rig.now);
+  stump(kType<HardpointStatus>.id, 35, 1);
+  rig.run(milliseconds{3});
+  EXPECT_EQ(rig.sut.counters().transfers, 2U);
+  EXPECT_EQ(rig.sut.counters().not_decoded, 1U);
+  EXPECT_EQ(rig.sut.inbox().hardpoint.count, 1U);
+  EXPECT_EQ(rig.sut.inbox().hardpoint.message.hardpoint_id, 1);
+
+  Rig without_id({.node_id = 0, .unique_id = kUniqueId});
+  CanFrame empty;  // an answer of the allocator with nothing in it
+  empty.id = 0x10000000U | std::uint32_t{kType<Allocation>.id} << 8U | 127U;
+  empty.size = 1;
+  empty.data[0] = 0xc0;
+  empty.stamp = without_id.now;
+  without_id.bus.incoming.push_back(empty);
+  without_id.run(milliseconds{3});
+  EXPECT_EQ(without_id.sut.counters().not_decoded, 1U);
+  EXPECT_EQ(without_id.sut.node_id(), 0);
+}
+
+TEST(Node, TakesNoNoticeOfWhatIsForOthers) {
+  Rig rig;
+  say(rig.bus, ArmingStatus{}, 20, 0, rig.now);
+  say(rig.bus, LightsCommand{}, 20, 0, rig.now);
+  rig.run(milliseconds{3});
+  EXPECT_EQ(rig.sut.counters().transfers, 0U);
+  EXPECT_EQ(rig.sut.counters().not_decoded, 0U);
+  EXPECT_EQ(rig.sut.counters().foreign_command, 0U);
+}
+
 }  // namespace
 }  // namespace roborun::firmware_if::dronecan

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "firmware_if/dronecan/transfer.hpp"
+#include "tests/support/names.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::firmware_if::dronecan {
@@ -410,6 +411,62 @@ TEST(CanId, RoundTripsEveryHeader) {
     }
   }
   EXPECT_GT(checked, 30'000);
+}
+
+TEST(Reassembly, SaysHowManyTransfersAreUnfinished) {
+  const std::vector<CanFrame> f = three_frames();
+  Feed feed;
+  EXPECT_EQ(feed.sut.unfinished(), 0U);
+  EXPECT_EQ(feed(f[0]), FrameVerdict::kAccepted);
+  CanFrame of_another = f[0];
+  of_another.id = (kId & ~0x7fU) | 2U;
+  EXPECT_EQ(feed(of_another), FrameVerdict::kAccepted);
+  EXPECT_EQ(feed.sut.unfinished(), 2U);
+  EXPECT_EQ(feed(f[1]), FrameVerdict::kAccepted);
+  EXPECT_EQ(feed(f[2]), FrameVerdict::kDelivered);
+  EXPECT_EQ(feed.sut.unfinished(), 1U);
+}
+
+TEST(Reassembly, VerdictsHaveTheNamesOfTheLog) {
+  test::expect_names<FrameVerdict>(
+      {"delivered", "accepted", "unknown type", "duplicate", "malformed", "missed start", "wrong transfer id",
+       "wrong toggle", "timed out", "too long", "bad crc"},
+      "unknown");
+}
+
+TEST(Split, RefusesAHeaderThatNoIdentifierHolds) {
+  const std::array<std::uint8_t, 3> payload{1, 2, 3};
+  std::array<CanFrame, 4> frames;
+  const TransferHeader good{TransferKind::kMessage, 1034, 10, 0, 16, 3};
+  const auto fits = [&](const TransferHeader& header) {
+    return split(header, 0x1234, payload, MonotonicTime{}, frames).ok();
+  };
+  ASSERT_TRUE(fits(good));
+  TransferHeader bad = good;
+  bad.source_node_id = 128;
+  EXPECT_FALSE(fits(bad));
+  bad = good;
+  bad.priority = 32;
+  EXPECT_FALSE(fits(bad));
+  bad = good;
+  bad.transfer_id = 32;
+  EXPECT_FALSE(fits(bad));
+  bad = good;
+  bad.destination_node_id = 9;
+  EXPECT_FALSE(fits(bad)) << "a message is for all";
+  bad = good;
+  bad.source_node_id = 0;
+  EXPECT_FALSE(fits(bad)) << "anonymous, and its type needs more than two bits";
+  bad.data_type_id = 3;
+  EXPECT_TRUE(fits(bad));
+  const TransferHeader request{TransferKind::kRequest, 1, 10, 20, 16, 3};
+  ASSERT_TRUE(fits(request));
+  bad = request;
+  bad.destination_node_id = 0;
+  EXPECT_FALSE(fits(bad));
+  bad = request;
+  bad.data_type_id = 256;
+  EXPECT_FALSE(fits(bad));
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 set -u
 roborun=$1
 data=$2
-work=$(mktemp -d)
+work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 failed=0
 check() { if ! "${@:2}"; then echo "FAILED: $1"; failed=1; fi; }
@@ -55,5 +55,22 @@ refuses "'x' (message) is unknown" '{"type":"x","source_node_id":3}'
 refuses "source_node_id must be" '{"type":"uavcan.protocol.NodeStatus","source_node_id":200}'
 refuses "'fields.nope' is unknown" '{"type":"uavcan.protocol.NodeStatus","source_node_id":2,"fields":{"nope":1}}'
 refuses "line 1" '{broken'
+# A log that names ever new interfaces takes no more memory than one with the most there may be.
+python3 -c 'print("\n".join(f"({i}.0) c{i} 10015501#00000000000000C0" for i in range(2000)))' >"$work/many.log"
+python3 - "$roborun" "$work" <<'PY'
+import resource, subprocess, sys
+with open(sys.argv[2] + "/err", "w") as err:
+    code = subprocess.run([sys.argv[1], "can", "decode", "--candump", sys.argv[2] + "/many.log"], stdout=subprocess.DEVNULL, stderr=err).returncode
+sys.exit(0 if code == 2 and resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 500000 else 1)
+PY
+check "too many interfaces are refused within 500 MB" test $? -eq 0
+check "the one too many is named: $(tail -1 "$work/err")" \
+  grep -q "line 33: interface 'c32' is one too many: must be at most 32 in a log" "$work/err"
+head -32 "$work/many.log" | "$roborun" can decode >"$work/out" 2>"$work/err"
+check "as many as there may be are read" grep -q "^roborun can decode: 32 transfers" "$work/err"
+printf '(1.0) \xff 10015501#00000000000000C0\n' | "$roborun" can decode --json >"$work/out" 2>"$work/err"
+check "a name that is no text does not end the decoding: $(tail -1 "$work/err")" grep -q "^roborun can decode: 1 transfers" "$work/err"
+"$roborun" can decode --candump "$work" 2>"$work/err" >"$work/out"
+check "a folder is no log" test $? -eq 2
 [[ $failed -eq 0 ]] && echo "roborun can: all checks passed"
 exit $failed

@@ -3,7 +3,7 @@
 # command goes on, and ends with the bytes of a run that was never stopped; --json ends with one JSON object.
 set -u
 roborun=$1
-folder=$(mktemp -d "${TMPDIR:-/tmp}/roborun_sweep_cli.XXXXXX")
+folder=$(mktemp -d "${TMPDIR:-/tmp}/roborun_sweep_cli.XXXXXX") || exit 1
 trap 'rm -rf "$folder"' EXIT
 failed=0
 passed=0
@@ -56,6 +56,22 @@ sweep --out "$folder/whole" >"$folder/table"
 check "the table" grep -q "^aware  *paper" "$folder/table"
 other=$("$roborun" sweep --out "$folder/whole" 2>&1)
 check "another request in the same folder is refused" test $? -eq 2 -a "${other/other environments/}" != "$other"
+commit=$("$roborun" --version | sed -n 's/.*, commit //p')
+check "--version names the commit" grep -qE '^([0-9a-f]{40}(\+changes)?|unknown)$' <<<"$commit"
+for file in request.json tables.txt report.html; do check "$file names the commit" grep -qF "$commit" "$folder/whole/$file"; done
+"$roborun" sweep --environments 1,14,27 --designs aware --out "$folder/three" >/dev/null 2>&1
+check "three missions in which all knobs change arrive" grep -qE '^aware +paper +3 +3 +0 ' "$folder/three/tables.txt"
+for missing in "10, 19" "4, 7" "2, 3"; do
+  check "they compare no knob" grep -q "aware        not compared; beside 1: $missing missing" "$folder/three/tables.txt"
+done
+check "nor is one drawn beside the published" test "$(grep -c '\[1.[345]x\]' "$folder/three/sensitivity.svg")" -eq 0
+cp -r "$folder/whole" "$folder/older"
+sed -i 's/"commit": ".*"/"commit": "0123"/' "$folder/older/request.json"
+other=$(sweep --out "$folder/older" 2>&1 >/dev/null)
+check "a folder of another commit is not gone on with" test $? -eq 2
+other=$("$roborun" sweep merge "$folder/older" --out "$folder/merged" 2>&1)
+check "nor merged" test $? -eq 2 -a "${other/flown by commit 0123/}" != "$other" -a ! -e "$folder/merged"
+check "compare names commits" grep -qF "$folder/whole: commit $commit" <("$roborun" sweep compare "$folder/whole")
 made=$("$roborun" sweep --out /proc/nope 2>&1)
 check "a folder that cannot be made is refused" test $? -eq 2 -a "${made/cannot be made/}" != "$made"
 for signal in INT KILL; do
@@ -96,4 +112,4 @@ BOARD
 check "a board file is a profile" grep -q '"profiles":{"paper":{"aware":.*},"board":{"aware":{"missions":1,' "$folder/json"
 check "each profile has its picture" test -s "$folder/boards/sensitivity_board.svg"
 echo "$passed passed, $failed failed"
-[[ $failed -eq 0 && $passed -ge 32 ]]
+[[ $failed -eq 0 && $passed -ge 45 ]]

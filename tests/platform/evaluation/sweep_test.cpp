@@ -20,6 +20,7 @@ namespace {
 /// Two short environments, two designs, two seeds, each stopped after seconds of flight.
 SweepPlan small_plan() {
   SweepPlan plan;
+  plan.commit = "c0ffee";
   plan.build = "0123456789abcdef";
   plan.environments = {1, 14};
   plan.profiles = {{"paper", "0"}};
@@ -62,6 +63,8 @@ TEST(Sweep, HasTheSameBytesWithOneJobWithTwoAndFromShards) {
   EXPECT_EQ(one.count("flight_aware_1.json"), 1U);
   EXPECT_EQ(one.count("flight_aware_2.json"), 1U) << "every seed of the representative environment";
   EXPECT_NE(one.at("tables.txt").find("zone"), std::string::npos);
+  for (const char* file : {"request.json", "tables.txt", "report.html"})
+    EXPECT_NE(one.at(file).find("c0ffee"), std::string::npos) << file << " names no commit";
   const std::string& page = one.at("report.html");
   EXPECT_NE(page.find("</svg>"), std::string::npos);
   for (const char* outside : {"href", "<script", "src="}) EXPECT_EQ(page.find(outside), std::string::npos);
@@ -140,6 +143,10 @@ TEST(SweepPlan, ReadsBackWhatItWroteAndNamesTheFirstDifference) {
   plan.seeds = {3};
   EXPECT_EQ(difference(back, plan), "seeds");
   const std::string text = to_json(plan);
+  std::string before_commits = text;
+  const std::size_t at = before_commits.find("\"commit\"");
+  before_commits.erase(at, before_commits.find('\n', at) - at);
+  EXPECT_EQ(plan_from_json("x", before_commits).commit, "") << "folders of before can still be read";
   for (std::size_t cut = 0; cut + 2 < text.size(); cut += 7)
     EXPECT_THROW((void)plan_from_json("x", text.substr(0, cut)), InputError);
 }
@@ -165,6 +172,10 @@ TEST(SweepStore, RefusesAnotherPlanASecondProcessAndForeignLinesInOneLine) {
     EXPECT_NE(open(plan).find("another process"), std::string::npos);
   }
   EXPECT_EQ(open(plan), "accepted");
+  plan.commit = "0f1e2d";
+  EXPECT_NE(open(plan).find("other commit (c0ffee; this program is of 0f1e2d)"), std::string::npos)
+      << open(plan);
+  plan = small_plan();
   plan.build = "other";
   EXPECT_NE(open(plan).find("other build"), std::string::npos) << open(plan);
   plan = small_plan();

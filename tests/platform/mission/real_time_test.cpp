@@ -42,6 +42,38 @@ class RealTimeRun : public ::testing::Test {
       if (r.stopped_by.empty() || tries == 3 || stolen_ticks() - before < 5) return r;
     }
   }
+  /// The trace, the time line, the histograms and the worst frames tell of the same frames.
+  static void judge_evidence(const report::AuditReport& r) {
+    for (const core::LaneSpec& spec : core::kLanes) {
+      const report::AuditLane& l = lane(r, spec.id);
+      std::uint64_t traced = 0, drawn = 0, counted = 0;
+      for (const core::TraceEvent& e : r.trace) traced += e.is_frame && e.lane == spec.id ? 1U : 0U;
+      for (const report::TimeColumn& c : l.time_line) drawn += c.frames;
+      for (const auto& [us, count] : l.response.histogram) counted += count;
+      EXPECT_EQ(traced, l.frames) << spec.name;
+      EXPECT_EQ(drawn, l.frames) << spec.name;
+      EXPECT_EQ(counted, l.frames) << spec.name;
+    }
+    for (const core::SlotSpec& spec : core::kFrameTable) {
+      const report::AuditSlot& s = slot(r, spec.id);
+      if (s.time.count == 0) continue;
+      EXPECT_TRUE(s.longest.known) << spec.name;
+      EXPECT_EQ(s.longest.seed, 1U);
+      EXPECT_LE(s.longest.decision, r.decisions) << spec.name;
+      Nanos spent{0};
+      for (const core::TraceEvent& e : r.trace)
+        if (!e.is_frame && e.slot == spec.id && e.frame == s.longest.cause.frame) spent += e.end - e.begin;
+      EXPECT_NEAR(1e-3 * static_cast<double>(spent.count()), s.time.max_us, 1e-6) << spec.name;
+    }
+    EXPECT_GT(slot(r, core::SlotId::kPlanner).longest.decision, 0U);
+    EXPECT_FALSE(r.interference.empty());
+    for (const char* key :
+         {"commit", "program_digest", "compiler", "flags", "kernel", "cpu", "microcode", "firmware",
+          "governor", "frequency", "isolated", "sched_rt_runtime_us", "seed", "rate_Hz", "host"})
+      EXPECT_TRUE(std::any_of(r.identity.begin(), r.identity.end(), [key](const auto& pair) {
+        return pair.first == key && !pair.second.empty();
+      })) << key;
+  }
   /// Of 10 ms, from all CPUs, since the machine started.
   static std::uint64_t stolen_ticks() {
     std::ifstream file("/proc/stat");
@@ -62,6 +94,8 @@ TEST_F(RealTimeRun, FliesWithoutAHeapCallOrAPageFault) {
   EXPECT_GT(lane(r, core::LaneId::kFlight).frames, 1000U);
   EXPECT_GT(slot(r, core::SlotId::kPlanner).time.count, 0U);
   EXPECT_GT(r.trace.size(), 1000U);
+  EXPECT_EQ(r.events_lost, 0U);
+  judge_evidence(r);
   EXPECT_EQ(r.stopped_by, "");
   EXPECT_EQ(r.heap_calls_after_start, 0U);
   const bool locked = std::none_of(r.missing.begin(), r.missing.end(),

@@ -10,6 +10,7 @@
 
 #include "platform/board/board_profile.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/mission/flight_setup.hpp"
 #include "platform/mission/mission.hpp"
 #include "platform/mission/replay.hpp"
 #include "platform/sitl/aircraft/camera_rig.hpp"
@@ -127,6 +128,20 @@ TEST_F(Replay, HoldsDifferentCamerasAndALidar) {
       << "recording changed the flight";
 }
 
+TEST_F(Replay, HoldsTheModelsOfItsSensors) {
+  config_.simulator.rig = two_cameras_and_a_lidar();
+  config_.simulator.rig->cameras[0].model = CameraModel::kD455;
+  config_.simulator.rig->lidars[0].model = LidarModel::kMid360;
+  config_.simulator.sensors.imu = ImuModel::kMems;
+  config_.simulator.sensors.gnss = GnssModel::kM9n;
+  const ReplayResult r = replay_flight(record(), {});
+  EXPECT_TRUE(r.same()) << "frame " << r.diverged_in << " of " << r.recorded.minor_frames;
+  const RecordedFlight flight = Recording(config_.record).flight();
+  EXPECT_EQ(flight.sensors.cameras[0].model, CameraModel::kD455);
+  EXPECT_EQ(flight.sensors.cameras[1].model, CameraModel::kClean);
+  EXPECT_EQ(flight.sensors.lidars[0].model, LidarModel::kMid360);
+}
+
 TEST_F(Replay, HoldsAVehicleWhoseStoppingNobodyMeasured) {
   set_vehicle(config_, vehicle::load_vehicle("x500"));
   ASSERT_FALSE(config_.flight.vehicle.measured_stopping.has_value()) << "else nothing is tested";
@@ -193,6 +208,16 @@ TEST_F(Replay, RefusesWhatIsNoRecording) {
   EXPECT_THROW((void)replay_flight(test::scratch("not_there.rec"), {}), InputError);
 }
 
+TEST_F(Replay, AFlightThatWasNotFinishedLeavesTheRecordingBefore) {
+  const std::string before = record();
+  const std::string bytes = read(before);
+  sitl::CameraRig rig(world_, config_.simulator, 1);
+  sitl::SimulatedAircraft aircraft(config_.flight.vehicle, config_.simulator, ground_below(world_), 1,
+                                   core::kMinorFrame, rig);
+  { FlightRecorder recorder(before, flight_config_of(world_, config_), config_, aircraft, rig.cameras()); }
+  EXPECT_EQ(read(before), bytes);
+}
+
 TEST_F(Replay, RefusesAConfigurationThatNobodyWrote) {
   // The checksum is no secret: whoever makes a file can make it fit. What is in it is checked all the same.
   const auto refused = [&](const char* wanted, const MissionConfig& config) {
@@ -204,7 +229,11 @@ TEST_F(Replay, RefusesAConfigurationThatNobodyWrote) {
     written.vehicle = config.flight.vehicle;
     written.minor_frame = config.flight.minor_frame;
     written.costs = config.flight.costs;
-    { FlightRecorder recorder(path, written, config, aircraft, rig.cameras()); }
+    FlightSetup setup(flight_config_of(world_, config_), config_.backends, image_limits(config_));
+    FlightRecorder recorder(path, written, config, aircraft, rig.cameras());
+    recorder.finish(setup.parts().map);
+    constexpr std::uintmax_t kEnd_bytes = 8 + 24 + 8;
+    std::filesystem::resize_file(path, std::filesystem::file_size(path) - kEnd_bytes);
     try {
       (void)replay_flight(path, {});
       FAIL() << wanted;

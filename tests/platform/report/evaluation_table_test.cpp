@@ -48,13 +48,29 @@ TEST(KernelTable, TellsWhatAwarenessGainsFromWhatFasterCodeGains) {
 
 TEST(SensitivityTable, GivesTimesTheirRatioItsIntervalOverSeedsAndThePublishedOne) {
   // 900 m: 180 and 225 s (ratio 1.25) with seed 1, 180 and 450 s (2.5) with seed 2: 1.875 +- 12.706 * 0.625.
-  const std::vector<SweepRow> rows{row("aware", 1, 5.0, 0.3), row("aware", 1, 4.0, 0.6),
-                                   row("aware", 2, 5.0, 0.3), row("aware", 2, 2.0, 0.6)};
+  const std::vector<SweepRow> rows{row("aware", 1, 5.0, 0.3), row("aware", 1, 5.0),
+                                   row("aware", 1, 4.0, 0.6), row("aware", 2, 5.0, 0.3),
+                                   row("aware", 2, 5.0),      row("aware", 2, 2.0, 0.6)};
   const std::string table = sensitivity_table(rows, "paper");
   EXPECT_TRUE(says(table, "density ", "s at 0.3"));
+  EXPECT_TRUE(says(table, "                  aware", "6 of 6"));
   EXPECT_TRUE(says(table, "                  aware", "1.88 +-7.94        1.5"));
-  EXPECT_EQ(table.find("spread"), std::string::npos) << "one value only";
-  EXPECT_NE(sensitivity_table({}, "paper").find("nothing to compare"), std::string::npos);
+  EXPECT_TRUE(says(table, "                  aware", "not compared; beside 5: 2, 8 missing")) << "spread";
+  EXPECT_TRUE(says(table, "                  aware", "not compared; beside 5: 4, 6 missing")) << "distance";
+}
+
+TEST(SensitivityTable, ComparesNothingWhereAllKnobsChangeAtOnce) {
+  // Environments 1, 14 and 27.
+  std::vector<SweepRow> rows{row("aware", 1, 5.0, 0.3), row("aware", 1, 5.0), row("aware", 1, 4.0, 0.6)};
+  rows.front().spread_m = 40.0;
+  rows.front().distance_m = 600.0;
+  rows.back().spread_m = 120.0;
+  rows.back().distance_m = 1200.0;
+  const std::string table = sensitivity_table(rows, "paper");
+  EXPECT_TRUE(says(table, "                  aware", "not compared; beside 1: 10, 19 missing"));
+  EXPECT_TRUE(says(table, "                  aware", "not compared; beside 1: 4, 7 missing"));
+  EXPECT_TRUE(says(table, "                  aware", "not compared; beside 1: 2, 3 missing"));
+  EXPECT_EQ(table.find("1.5\n"), std::string::npos) << "the published ratio has nothing beside it";
 }
 
 TEST(RepresentativeTable, SplitsLatencyByZoneAndStageBesideWhatWasPublished) {
@@ -77,6 +93,13 @@ TEST(RepresentativeTable, SplitsLatencyByZoneAndStageBesideWhatWasPublished) {
   EXPECT_TRUE(says(table, "aware        A", "2.90 +-3.81     6.00    up to 10    0.100    0.100    2.000"));
   EXPECT_TRUE(says(table, "aware        B", "0.15"));
   EXPECT_TRUE(says(representative_table(flights, {}), "aware        all", "6.00"));
+  EXPECT_TRUE(says(table, "  published", "2.01"));
+  for (MissionReport& flight : flights) flight.result.env = "2";
+  const std::string other = representative_table(flights, {200.0, 700.0});
+  EXPECT_TRUE(says(other, "aware ", "2/2        225 +-0"));
+  for (const char* printed : {"2.01", "0.43", "4.6 velocity", "up to"})
+    EXPECT_EQ(other.find(printed), std::string::npos) << printed << " is of environment 14";
+  EXPECT_FALSE(says(other, "aware        B", "0.15"));
 }
 
 }  // namespace

@@ -61,7 +61,22 @@ TEST(SensitivitySvg, WritesTheRatioOfTheHighestKnobToTheLowestBesideThePublished
   const std::string svg = sensitivity_svg(sut, "paper");
   EXPECT_TRUE(sound(svg));
   EXPECT_EQ(count(svg, "1.50x [1.5x]"), 1U);
-  EXPECT_EQ(count(sensitivity_svg(rows(3), "paper"), kWhisker), 3U * 2U * (3U + 1U + 1U));
+  EXPECT_EQ(count(sensitivity_svg(rows(3), "paper"), kWhisker), 3U * 2U * 3U)
+      << "metrics, designs, densities";
+  EXPECT_EQ(count(svg, "static: beside 5: 4, 6 missing"), 3U) << "the distance of no two rows differs";
+}
+
+TEST(SensitivitySvg, DrawsNothingFromEnvironmentsInWhichAllKnobsChange) {
+  std::vector<SweepRow> sut = rows(1);
+  for (SweepRow& row : sut) {
+    row.spread_m = row.density_ratio < 0.4 ? 40.0 : row.density_ratio > 0.5 ? 120.0 : 80.0;
+    row.distance_m = 7.5 * row.spread_m + 300.0;
+  }
+  const std::string svg = sensitivity_svg(sut, "paper");
+  EXPECT_TRUE(sound(svg));
+  EXPECT_EQ(count(svg, "<polyline"), 0U);
+  EXPECT_EQ(count(svg, "[1.5x]"), 0U);
+  EXPECT_EQ(count(svg, "aware: beside 1: 10, 19 missing"), 3U);
 }
 
 TEST(BreakdownSvg, DrawsEveryStageAndTheMeanOfEachZone) {

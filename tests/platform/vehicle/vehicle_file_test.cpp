@@ -77,6 +77,36 @@ TEST(VehicleFile, HoldsItsSensors) {
   EXPECT_EQ(v.rig.lidars[0].range_m, 70.0);
 }
 
+TEST(VehicleFile, NamesTheModelsOfItsSensors) {
+  const std::string camera = kCamera, lidar = kLidar;
+  const Vehicle clean = vehicle_from_toml("mine.toml", blind_paper() + camera + lidar);
+  EXPECT_EQ(clean.rig.cameras[0].model, CameraModel::kClean);
+  EXPECT_EQ(clean.rig.lidars[0].model, LidarModel::kClean);
+  EXPECT_EQ(clean.rig.gnss, GnssModel::kClean);
+  EXPECT_EQ(clean.rig.imu, ImuModel::kClean);
+  const Vehicle v =
+      vehicle_from_toml("mine.toml", blind_paper() + "[imu]\nmodel = \"mems\"\n[gnss]\nmodel = \"m9n\"\n" +
+                                         camera + "model = \"oak-d\"\ninvalid_ratio = 0.3\n" + camera +
+                                         "model = \"clean\"\n" + lidar + "model = \"mid360\"\n");
+  EXPECT_EQ(v.rig.cameras[0].model, CameraModel::kOakD);
+  EXPECT_EQ(v.rig.cameras[0].invalid_ratio, 0.3);
+  EXPECT_EQ(v.rig.cameras[1].model, CameraModel::kClean);
+  EXPECT_EQ(v.rig.lidars[0].model, LidarModel::kMid360);
+  EXPECT_EQ(v.rig.gnss, GnssModel::kM9n);
+  EXPECT_EQ(v.rig.imu, ImuModel::kMems);
+  const auto says = [&](const std::string& more, const char* what) {
+    EXPECT_NE(refusal(blind_paper() + more).find(what), std::string::npos) << refusal(blind_paper() + more);
+  };
+  says(camera + "model = \"d999\"\n", R"(model: must be one of "clean", "d435", "d455", "oak-d", "tof")");
+  says(camera + "model = 5\n", "model: must be one of");
+  says(camera + "invalid_ratio = 0.3\n", "invalid_ratio: must not be there without a model");
+  says(camera + "model = \"tof\"\ninvalid_ratio = 0.7\n", "invalid_ratio: must be a number from 0 to 0.6");
+  says(camera + lidar + "model = \"d455\"\n", R"(model: must be one of "clean", "mid360", "ring")");
+  says(camera + lidar + "invalid_ratio = 0.3\n", "invalid_ratio: unknown key in [[lidar]]");
+  says("[gnss]\n" + camera, "model: missing in [gnss]");
+  says("[imu]\nmodel = \"m9n\"\n" + camera, R"(model: must be one of "clean", "mems")");
+}
+
 TEST(VehicleFile, RefusesSensorsThatCannotBe) {
   const std::string paper = blind_paper();
   EXPECT_NE(refusal(paper).find("camera: missing"), std::string::npos) << "a vehicle that sees nothing";
@@ -84,7 +114,7 @@ TEST(VehicleFile, RefusesSensorsThatCannotBe) {
     return refusal(paper + replaced(kCamera, what, instead));
   };
   EXPECT_EQ(refusal(paper + kCamera), "");
-  EXPECT_NE(with("width = 640", "width = 1281").find("width: must be a number from 8 to 1280"),
+  EXPECT_NE(with("width = 640", "width = 1281").find("width: must be a whole number from 8 to 1280"),
             std::string::npos);
   EXPECT_NE(with("width = 640", "width = 64.5").find("width: must be a whole number"), std::string::npos);
   EXPECT_NE(with("vertical_fov_deg = 58", "vertical_fov_deg = 0").find("vertical_fov_deg: must be"),

@@ -143,6 +143,25 @@ TEST(Estimator, RefusesWhatIsNotFiniteOrNotNewerAndCountsIt) {
   EXPECT_LT((s.p_WB - Circle::p_W(2.0)).norm(), 0.2);
 }
 
+TEST(Estimator, BeginsAnewFromTheNextFixWhereItsStateOverflows) {
+  Estimator estimator({});
+  Circle circle;
+  run(estimator, circle, 0.0, 2.0);
+  EstimatedState s;
+  ASSERT_EQ(estimator.state(s), Status::kOk);
+  for (int i = 1; i <= 40 && estimator.counters().resets == 0; ++i) {
+    auto imu = circle.imu(at(2.0 + 0.0025 * i));
+    imu.specific_force_B_mps2 = {1e308, 1e308, 1e308};  // finite, each of them
+    (void)estimator.predict(imu);
+  }
+  EXPECT_EQ(estimator.counters().resets, 1U);
+  EXPECT_EQ(estimator.state(s), Status::kNotReady) << "nothing that is not finite is handed out";
+  run(estimator, circle, 2.2, 8.0);
+  ASSERT_EQ(estimator.state(s), Status::kOk);
+  EXPECT_LT((s.p_WB - Circle::p_W(8.0)).norm(), 0.5);
+  EXPECT_EQ(estimator.counters().resets, 1U);
+}
+
 TEST(Estimator, SaysWhenTheImuIsLost) {
   Estimator estimator({});
   Circle circle;

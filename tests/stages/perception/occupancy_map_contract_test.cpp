@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
+#include <vector>
 
 #include "stages/perception/brick_map.hpp"
 #include "stages/perception/octomap_backend/octomap_backend.hpp"
@@ -130,6 +132,66 @@ TEST_P(OccupancyMapContract, SpendsTheVolumeNearestFirst) {
   EXPECT_EQ(see(scene_.look(at_), 0, 3000.0), Status::kBudgetSpent);
   EXPECT_EQ(at(Vector3(0, 0, 3)), CellState::kFree);
   EXPECT_EQ(at(Vector3(-18, 0, 5)), CellState::kUnknown);
+}
+
+TEST_P(OccupancyMapContract, AViewEndsWhereItsVolumeIsSpent) {
+  const Vector3 far(-10, 3, 5);
+  ASSERT_EQ(see(scene_.look(at_)), Status::kOk);
+  ASSERT_EQ(at(far), CellState::kFree);
+  core::Work work;
+  (void)sut_->export_view({0, 1000.0, at_}, unlimited_, work);
+  EXPECT_LE(work.volume_m3, 1000.0);
+  EXPECT_EQ(at(Vector3(0, 0, 3)), CellState::kFree);
+  EXPECT_EQ(at(far), CellState::kUnknown);
+}
+
+TEST_P(OccupancyMapContract, ACoarserViewIsNeverFreer) {
+  ASSERT_EQ(see(scene_.look(at_)), Status::kOk);
+  std::vector<Vector3> points;
+  for (double x = -9; x <= 9.5; x += 1.3)
+    for (double y = -9; y <= 9; y += 1.3) points.emplace_back(x, y, 4.7);
+  std::vector<CellState> finest;
+  for (const Vector3& p : points) finest.push_back(at(p));
+  ASSERT_GT(std::count(finest.begin(), finest.end(), CellState::kFree), 20);
+  ASSERT_GT(std::count(finest.begin(), finest.end(), CellState::kOccupied), 0);
+  for (int level = 1; level < kPrecisionLevels; ++level) {
+    core::Work work;
+    ASSERT_EQ(sut_->export_view({level, kInfinity, at_}, unlimited_, work), Status::kOk);
+    EXPECT_EQ(sut_->view().cell_m(), cell_size_m(level));
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const CellState coarse = at(points[i]);
+      if (finest[i] == CellState::kOccupied) {
+        EXPECT_EQ(coarse, CellState::kOccupied) << level << ": " << points[i].transpose();
+      } else if (coarse == CellState::kFree) {
+        EXPECT_EQ(finest[i], CellState::kFree) << level << ": " << points[i].transpose();
+      }
+      const Aabb box = Aabb::around(points[i], 0.4);
+      if (sut_->view().is_free(box, lookups_)) {
+        EXPECT_TRUE(sut_->view().is_free_at_finest(box, lookups_)) << level << ": " << points[i].transpose();
+      }
+    }
+  }
+}
+
+TEST_P(OccupancyMapContract, EndsWhenTheBudgetIsSpentAndKeepsWhatItHas) {
+  class Spent final : public core::StageBudget {
+   public:
+    [[nodiscard]] bool spent(const core::Work& done) noexcept override { return done.units > 0; }
+  } budget;
+  const auto frames = scene_.look(at_);
+  const std::array<Vector3, 1> here{at_};
+  EXPECT_EQ(sut_->integrate({frames, 0, kInfinity, here}, budget, result_), Status::kBudgetSpent);
+  const std::uint64_t units = result_.work.units;
+  EXPECT_EQ(sut_->integrate({frames, 0, kInfinity, here}, unlimited_, result_), Status::kOk);
+  EXPECT_LT(units, result_.work.units);
+}
+
+TEST_P(OccupancyMapContract, SaysHowMuchMemoryItTakes) {
+  const std::size_t empty = sut_->bytes();
+  ASSERT_EQ(see(scene_.look(at_)), Status::kOk);
+  EXPECT_GT(sut_->bytes(), 0U);
+  EXPECT_GE(sut_->bytes(), empty);
+  EXPECT_EQ(sut_->refusals(), 0U);
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, OccupancyMapContract, ::testing::Values("own", "octomap"),

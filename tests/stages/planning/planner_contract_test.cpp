@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "core/random/counter_rng.hpp"
+#include "stages/planning/fenced_view.hpp"
 #include "stages/planning/ompl_backend/ompl_backend.hpp"
 #include "stages/planning/ompl_backend/ompl_space.hpp"
 #include "stages/planning/ompl_backend/planner_for_ompl.hpp"
@@ -308,6 +309,40 @@ TEST_F(RrtStarTest, PlanDoesNotAllocate) {
   (void)sut_.plan(request_to(Vector3(150, 0, 5)), view, unlimited_, result_);
   (void)sut_.plan(request_to(Vector3(18, 1, 5)), view, unlimited_, result_);
   EXPECT_EQ(scope.count(), 0U);
+}
+
+TEST_F(RrtStarTest, EscapesToTheNearestFreePlaceAndNeverThroughWhatIsOccupied) {
+  core::UnlimitedBudget unlimited;
+  PlanResult result;
+  test::BoxView wall = pillar_world();
+  wall.occupied = {{Vector3(0.5, -20, 0), Vector3(1.5, 20, 20)}};
+  PlanRequest r = request_to(Vector3(150, 0, 5));
+  r.start_W = Vector3(-0.2, 0, 5);  // 0.7 m from the wall, 0.9 are wanted
+  EXPECT_EQ(sut_.plan(r, wall, unlimited, result), Status::kStartBlocked);
+  ASSERT_EQ(result.path_W.size(), 2U);
+  EXPECT_EQ(result.path_W[0], r.start_W);
+  EXPECT_EQ(result.path_W[1], Vector3(-0.5, 0, 5)) << "the first free place in steps of a cell";
+  EXPECT_DOUBLE_EQ(result.cost_m, 0.3);
+  r.start_W = Vector3(1.0, 0, 5);
+  EXPECT_EQ(sut_.plan(r, wall, unlimited, result), Status::kStartBlocked);
+  EXPECT_TRUE(result.path_W.empty()) << "inside the wall every way out touches it";
+}
+
+TEST(FencedView, IsTheMapInsideTheFenceAndOccupiedOutside) {
+  const test::BoxView map = pillar_world();
+  core::Fence fence;
+  ASSERT_EQ(fence.add_circle(core::FenceSide::kKeepIn, {0, 0}, 7.0), core::FenceFault::kNone);
+  const FencedView sut(map, fence);
+  std::uint64_t lookups = 0;
+  for (const double x_m : {-20.0, -6.0, 0.0, 6.0, 10.0, 20.0}) {
+    const Aabb box = Aabb::around(Vector3(x_m, 0, 5), 0.5);
+    const bool inside = std::fabs(x_m) < 7.0;
+    EXPECT_EQ(sut.is_free(box, lookups), inside) << x_m;
+    EXPECT_EQ(sut.is_free_at_finest(box, lookups), inside) << x_m;
+    EXPECT_EQ(sut.at(Vector3(x_m, 0, 5), lookups), inside ? CellState::kFree : CellState::kOccupied) << x_m;
+  }
+  EXPECT_EQ(sut.at(Vector3(0, 0, 13), lookups), CellState::kUnknown) << "the map's answer, inside the fence";
+  EXPECT_EQ(sut.cell_m(), map.cell_m());
 }
 
 }  // namespace

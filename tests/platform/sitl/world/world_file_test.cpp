@@ -4,7 +4,9 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
+#include <vector>
 
 #include "platform/input/input_error.hpp"
 #include "tests/support/scratch.hpp"
@@ -52,6 +54,50 @@ TEST_F(WorldFile, ReadsMovingBodies) {
   EXPECT_EQ(world.bodies()[0].start_s, 4.0);
   EXPECT_EQ(world.bodies()[0].path_W[1], Vector3(9, -9, 2));
   EXPECT_EQ(world.bodies()[1].speed_mps, 0.0);
+}
+
+/// A world with these keys of the reference, in a value of each one's form.
+std::string text_of(const std::vector<WorldKey>& keys) {
+  std::string text;
+  std::string_view table;
+  for (const WorldKey& k : keys) {
+    if (k.table != table) text += k.table == "world" ? "[world]\n" : "[[" + std::string(k.table) + "]]\n";
+    table = k.table;
+    const double number = k.key == "top" ? 9.0 : k.fallback.value_or(1.5);
+    std::string value = std::to_string(number);
+    if (k.key == "bounds") value = "[[-30, -30, 1], [30, 30, 9]]";
+    if (k.key == "path") value = "[[9, 9, 2], [9, -9, 2]]";
+    if (k.key == "start" || k.key == "min") value = "[-20, -20, 3]";
+    if (k.key == "max") value = "[-19, -10, 4]";
+    if (k.key == "goal") value = "[20, 20, 3]";
+    if (k.key == "min") value = "[-19.5, -11, 3]";
+    text += std::string(k.key) + " = " + value + "\n";
+  }
+  return text;
+}
+
+TEST_F(WorldFile, TakesTheKeysOfItsReferenceAndNeedsThoseThatItSays) {
+  const std::vector<WorldKey> keys = world_keys();
+  ASSERT_GE(keys.size(), 15U);
+  EXPECT_EQ(complaint(text_of(keys)), "");
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    std::vector<WorldKey> fewer = keys;
+    fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(i));
+    const std::string missing = std::string(keys[i].key) + ": missing in [";
+    EXPECT_EQ(complaint(text_of(fewer)).find(missing) == std::string::npos, keys[i].fallback.has_value())
+        << keys[i].table << " " << keys[i].key << ": " << complaint(text_of(fewer));
+  }
+}
+
+TEST_F(WorldFile, TheExampleOfTheReadmeFlies) {
+  std::ifstream file(std::string(ROBORUN_TEST_DATA) + "/../../platform/sitl/README.md");
+  const std::string readme(std::istreambuf_iterator<char>(file), {});
+  const std::size_t begin = readme.find("```toml\n[world]");
+  ASSERT_NE(begin, std::string::npos);
+  const World world =
+      load_world(write(readme.substr(begin + 8, readme.find("```\n", begin + 8) - begin - 8)), {});
+  EXPECT_EQ(world.pillars().size(), 1U);
+  EXPECT_EQ(world.bodies().size(), 1U);
 }
 
 TEST_F(WorldFile, OtherEndsMayBeAskedFor) {

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "core/random/counter_rng.hpp"
 #include "platform/input/input_error.hpp"
@@ -31,6 +33,36 @@ TEST(World, ARayHitsTheFirstOfSeveralObstacles) {
   EXPECT_NEAR(world.hit_distance_m({0.0, 0.0, 5.0}, -Vector3::UnitZ(), 100.0), 5.0, 1e-9) << "the ground";
   EXPECT_TRUE(std::isinf(world.hit_distance_m({0.0, 0.0, 5.0}, Vector3::UnitY(), 100.0)));
   EXPECT_TRUE(std::isinf(world.hit_distance_m({0.0, 0.0, 5.0}, Vector3::UnitX(), 7.9))) << "out of reach";
+}
+
+TEST(VoxelGrid, ClearanceIsThatOfTheNearestOfAllVoxels) {
+  const Vector3 min_W(-3.0, 1.0, -2.0);
+  constexpr double kCell_m = 0.3;
+  VoxelGrid sut(min_W, kCell_m, {37, 20, 11});
+  core::CounterRng rng(11);
+  std::vector<Vector3> corners;
+  for (int i = 0; i < 40; ++i) {
+    const std::array<std::int64_t, 3> cell{static_cast<std::int64_t>(rng.below(37)),
+                                           static_cast<std::int64_t>(rng.below(20)),
+                                           static_cast<std::int64_t>(rng.below(11))};
+    sut.fill(cell, 1);
+    corners.emplace_back(min_W + kCell_m * Vector3(static_cast<double>(cell[0]), static_cast<double>(cell[1]),
+                                                   static_cast<double>(cell[2])));
+  }
+  int capped = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const Vector3 p_W(rng.uniform(-8.0, 12.0), rng.uniform(-3.0, 10.0), rng.uniform(-5.0, 4.0));
+    const double cap_m = rng.uniform(0.0, 6.0);
+    double least_m = cap_m;
+    for (const Vector3& corner : corners)
+      least_m = std::min(least_m,
+                         (p_W - p_W.cwiseMax(corner).cwiseMin(corner + Vector3::Constant(kCell_m))).norm());
+    ASSERT_NEAR(sut.clearance_m(p_W, cap_m), least_m, 1e-12);
+    capped += least_m == cap_m ? 1 : 0;
+  }
+  EXPECT_GT(capped, 300);
+  EXPECT_LT(capped, 2700);
+  EXPECT_EQ(VoxelGrid(min_W, kCell_m, {4, 4, 4}).clearance_m(Vector3::Zero(), kInfinity), kInfinity);
 }
 
 TEST(World, ClearanceIsZeroInsideAndTheDistanceOutside) {

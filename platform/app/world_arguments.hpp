@@ -1,0 +1,28 @@
+/// The options of every command that takes a world from a file.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "platform/sitl/world/world_file.hpp"
+
+namespace roborun::app {
+
+struct WorldArguments {
+  std::string start;
+  std::string goal;
+  std::string bounds;
+  std::string ground;
+  std::string cell;
+  double scale{1.0};
+  bool surfaces{false};
+};
+
+/// Adds --start, --goal, --bounds, --ground, --cell, --scale and --surfaces. `arguments` must outlive the command.
+void add_world_arguments(CLI::App& command, WorldArguments& arguments);
+/// For a vehicle of this radius. Throws InputError that names the option.
+[[nodiscard]] sitl::WorldOptions world_options(const WorldArguments& arguments, double radius_m);
+/// Whether any of them was given.
+[[nodiscard]] bool any_given(const WorldArguments& arguments);
+
+}  // namespace roborun::app
