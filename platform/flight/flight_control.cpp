@@ -88,6 +88,7 @@ void FlightControl::commit(MonotonicTime now) {
     committed_ = *offered_;
     ++committed_number_;
     offered_.reset();
+    airborne_ = true;  // also within the hover: from here on the vehicle is where its decisions say
   }
 }
 

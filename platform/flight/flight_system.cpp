@@ -28,6 +28,16 @@ stages::WayMemory::Config way_config(const FlightConfig& config) noexcept {
   return {config.bounds_W, planned_radius_m(config.vehicle), config.fence};
 }
 
+/// The published designs know their horizon alone.
+bool remembers_ways(const FlightConfig& config) noexcept {
+  return config.design == governor::Design::kAware && stages::WayMemory::fits(way_config(config));
+}
+
+std::optional<stages::WayMemory> ways_of(const FlightConfig& config, core::Arena& arena) noexcept {
+  if (!remembers_ways(config)) return std::nullopt;
+  return std::optional<stages::WayMemory>(std::in_place, way_config(config), arena);
+}
+
 /// No faster than the vehicle turns.
 GazeConfig gaze_of(const FlightConfig& config) noexcept {
   GazeConfig gaze = config.gaze;
@@ -88,7 +98,7 @@ std::size_t FlightSystem::arena_bytes(const FlightConfig& config) noexcept {
   std::size_t bytes = stages::PointCloud::arena_bytes({});
   for (const std::uint16_t pixels : config.cloud_pixels)
     if (pixels > 0) bytes += stages::CloudImages::arena_bytes({pixels});
-  bytes += stages::WayMemory::arena_bytes(way_config(config));
+  if (remembers_ways(config)) bytes += stages::WayMemory::arena_bytes(way_config(config));
   return bytes;
 }
 
@@ -97,11 +107,11 @@ FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, 
                            core::Arena& arena, std::span<firmware_if::Lidar* const> lidars) noexcept
     : map_((ROBORUN_ASSERT(config.validate() == Status::kOk), parts.map)),
       cloud_({}, arena),
-      ways_(way_config(config), arena),
+      ways_(ways_of(config, arena)),
       governor_(governor_config(config)),
       policy_(parts.policy != nullptr ? *parts.policy : governor_),
       pipeline_(pipeline_config(config), meter, policy_, cloud_, parts.map, parts.planner, smoother_,
-                config.design == governor::Design::kAware ? &ways_ : nullptr),
+                ways_ ? &*ways_ : nullptr),
       control_(config.vehicle, seconds(config.minor_frame), gaze_of(config)),
       flight_program_({config.vehicle, config.fence, config.answers}, control_, aircraft, mail_),
       decision_program_({config.goal_W, config.seed, config.fence, config.minor_frame}, pipeline_, cameras,

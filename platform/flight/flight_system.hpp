@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 
 #include "core/executive/stage_meter.hpp"
@@ -51,7 +52,7 @@ class FlightSystem {
   stages::OccupancyMap& map_;
   stages::PointCloud cloud_;
   stages::Smoother smoother_;
-  stages::WayMemory ways_;
+  std::optional<stages::WayMemory> ways_;  ///< Of the aware design, where the world fits.
   governor::Governor governor_;  ///< Idle if the policy is the reader's own.
   governor::DecisionPolicy& policy_;
   DecisionPipeline pipeline_;

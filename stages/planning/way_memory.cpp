@@ -5,6 +5,7 @@
 
 #include "core/random/counter_rng.hpp"
 #include "core/precision.hpp"
+#include "firmware_if/assert.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -32,11 +33,35 @@ std::uint64_t digest_of(const CellBlock& cells) noexcept {
 
 }  // namespace
 
+namespace {
+
+/// The first block, in cells from the world's origin, and the number of blocks.
+struct Extent {
+  std::array<std::int32_t, 3> corner{}, size{};
+  double blocks{1.0};
+};
+
+Extent extent_of(const WayMemory::Config& config) noexcept {
+  Extent e;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto axis = static_cast<int>(i);
+    const double low = std::floor((config.bounds_W.min_W[axis] - config.radius_m) / kBlock_m);
+    const double high = std::floor(config.bounds_W.max_W[axis] / kBlock_m) + 1.0;
+    e.blocks *= std::fmax(high - low, 1.0);
+    e.corner[i] = static_cast<std::int32_t>(std::fmax(low, -1e6)) * kBlockCells;
+    e.size[i] = static_cast<std::int32_t>(std::fmin(high - low, 1e6));
+  }
+  return e;
+}
+
+}  // namespace
+
+bool WayMemory::fits(const Config& config) noexcept {
+  return extent_of(config).blocks <= static_cast<double>(kMaxPositions);
+}
+
 std::size_t WayMemory::arena_bytes(const Config& config) noexcept {
-  const Vector3 size = config.bounds_W.size();
-  double positions = 1.0;
-  for (int i = 0; i < 3; ++i) positions *= std::ceil(size[i] / kBlock_m) + 2.0;
-  const auto count = static_cast<std::size_t>(std::fmin(positions, static_cast<double>(kMaxPositions)));
+  const auto count = static_cast<std::size_t>(extent_of(config).blocks);
   return count * (sizeof(std::int32_t) + sizeof(std::uint64_t) + sizeof(Node)) +
          config.max_blocks * (sizeof(Block) + sizeof(std::uint32_t) + kRooms * sizeof(Node)) +
          kWindowBlocks * (sizeof(CellBlock) + sizeof(BlockContent) + sizeof(std::uint64_t)) +
@@ -44,18 +69,12 @@ std::size_t WayMemory::arena_bytes(const Config& config) noexcept {
 }
 
 WayMemory::WayMemory(const Config& config, core::Arena& arena) noexcept
-    : config_(config), width_(static_cast<int>(std::ceil(2.0 * config.radius_m / kFinestCell_m - 1e-6))) {
-  std::array<std::int32_t, 3> corner{}, size{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const double low = std::floor((config.bounds_W.min_W[static_cast<int>(i)] - config.radius_m) / kBlock_m);
-    const double high = std::floor(config.bounds_W.max_W[static_cast<int>(i)] / kBlock_m) + 1.0;
-    corner[i] = static_cast<std::int32_t>(low) * kBlockCells;
-    size[i] = static_cast<std::int32_t>(high - low);
-  }
-  corner_ = {corner[0], corner[1], corner[2]};
-  size_ = {size[0], size[1], size[2]};
-  const auto positions = static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y) *
-                         static_cast<std::size_t>(size_.z);
+    : config_((ROBORUN_ASSERT(fits(config)), config)),
+      width_(static_cast<int>(std::ceil(2.0 * config.radius_m / kFinestCell_m - 1e-6))) {
+  const Extent e = extent_of(config);
+  corner_ = {e.corner[0], e.corner[1], e.corner[2]};
+  size_ = {e.size[0], e.size[1], e.size[2]};
+  const auto positions = static_cast<std::size_t>(e.blocks);
   kind_ = arena.take<std::int32_t>(positions, "way positions");
   digest_ = arena.take<std::uint64_t>(positions, "way digests");
   block_ = arena.take<Block>(config.max_blocks, "way blocks");

@@ -30,7 +30,10 @@ class WayMemory {
     core::Fence fence{};
     std::size_t max_blocks{9100};  ///< That are neither free all over nor unknown all over.
   };
+  /// False for worlds of more than 262,144 blocks.
+  [[nodiscard]] static bool fits(const Config& config) noexcept;
   [[nodiscard]] static std::size_t arena_bytes(const Config& config) noexcept;
+  /// Preconditions, asserted: fits(config), and the arena has arena_bytes().
   WayMemory(const Config& config, core::Arena& arena) noexcept;
 
   /// Reads what the map knows now within `reach_m` of a place. kOk or kBudgetSpent: the rest stays as it was.
