@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint32_t kLeaf = 4;
 /// Deeper than any tree that halves 2^32 triangles.
-constexpr std::size_t kDeepest = 64;
+constexpr std::size_t kDeepestTree = 64;
 
 Aabb box_of(const Triangle& t) noexcept {
   return {t[0].cwiseMin(t[1]).cwiseMin(t[2]), t[0].cwiseMax(t[1]).cwiseMax(t[2])};
@@ -140,7 +140,7 @@ double TriangleMesh::hit_distance_m(const Vector3& origin_W, const Vector3& dire
   if (node_.empty()) return kInfinity;
   double best_m = max_m;
   bool hit = false;
-  std::array<std::uint32_t, kDeepest> waiting;
+  std::array<std::uint32_t, kDeepestTree> waiting;
   std::size_t depth = 0;
   waiting[depth++] = 0;
   while (depth > 0) {
@@ -166,7 +166,7 @@ double TriangleMesh::hit_distance_m(const Vector3& origin_W, const Vector3& dire
 double TriangleMesh::clearance_m(const Vector3& p_W, double cap_m) const noexcept {
   if (node_.empty()) return cap_m;
   double best_m2 = cap_m * cap_m;
-  std::array<std::uint32_t, kDeepest> waiting;
+  std::array<std::uint32_t, kDeepestTree> waiting;
   std::size_t depth = 0;
   waiting[depth++] = 0;
   while (depth > 0) {
