@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "platform/sitl/world/ray_span.hpp"
 #include "platform/sitl/world/voxel_grid.hpp"
 
 namespace roborun::sitl {
@@ -18,20 +19,9 @@ Aabb box_of(const Triangle& t) noexcept {
 }
 
 double enter_m(const Aabb& box, const Vector3& o, const Vector3& d) noexcept {
-  double enter = 0.0;
-  double leave = kInfinity;
-  for (int i = 0; i < 3; ++i) {
-    if (d[i] == 0.0) {
-      if (o[i] < box.min_W[i] || o[i] > box.max_W[i]) return kInfinity;
-      continue;
-    }
-    const double t0 = (box.min_W[i] - o[i]) / d[i];
-    const double t1 = (box.max_W[i] - o[i]) / d[i];
-    enter = std::max(enter, std::min(t0, t1));
-    leave = std::min(leave, std::max(t0, t1));
-  }
+  const RaySpan span = span_in(box, o, d);
   // A flat box and rounding must not lose a hit.
-  return enter > leave + 1e-9 * (1.0 + enter) ? kInfinity : enter;
+  return span.enter_m > span.leave_m + 1e-9 * (1.0 + span.enter_m) ? kInfinity : span.enter_m;
 }
 
 /// Moeller and Trumbore (1997). A border a little wider than the triangle: no ray slips between two of them.
