@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cstdlib>
 #include <optional>
 #include <vector>
 
@@ -22,9 +21,9 @@ std::optional<std::array<double, count>> numbers(const char* option, const std::
   std::array<double, count> values{};
   bool ok = parts.size() == count;
   for (std::size_t i = 0; ok && i < count; ++i) {
-    char* end = nullptr;
-    values[i] = std::strtod(parts[i].c_str(), &end);
-    ok = !parts[i].empty() && *end == '\0' && std::isfinite(values[i]);
+    const auto value = input::number(parts[i]);
+    ok = value.has_value();
+    if (ok) values[i] = *value;
   }
   if (!ok) throw InputError(fmt::format("{}: '{}' is not {}", option, text, wanted));
   return values;

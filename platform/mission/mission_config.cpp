@@ -33,10 +33,13 @@ void check_room(const sitl::World& world, double radius_m) {
   };
   check("start", world.start_W());
   check("goal", world.goal_W());
-  const Vector3 ground_W = ground_below(world);
-  const Vector3 climb_W = world.start_W() - ground_W;
-  const int steps = static_cast<int>(std::ceil(climb_W.norm() / radius_m));
-  for (int i = 0; i < steps; ++i) check("below the start", ground_W + climb_W * i / steps);
+  // From where it no longer touches what it stands on, which need not be even.
+  constexpr double kUneven_m = 0.3;
+  const Vector3 up_W = Vector3::UnitZ() * (radius_m + kUneven_m);
+  const Vector3 lowest_W = ground_below(world) + up_W;
+  const Vector3 climb_W = world.start_W() - lowest_W;
+  const int steps = climb_W.z() > 0.0 ? static_cast<int>(std::ceil(climb_W.z() / radius_m)) : 0;
+  for (int i = 0; i < steps; ++i) check("below the start", lowest_W + climb_W * i / steps);
 }
 
 }  // namespace

@@ -5,12 +5,12 @@
 #include <limits>
 
 #include "core/geometry/math.hpp"
+#include "platform/sitl/sensors/draws.hpp"
 
 namespace roborun::sitl {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr double kDegree = core::kPi / 180.0;
 /// Neighbours differ by more than this beyond what a plane would: a step.
 constexpr double kStep_px = 1.0;
 /// Less has no depth: one pixel of disparity is 42 m of a D455.
@@ -18,12 +18,6 @@ constexpr double kLeast_px = 1.0;
 constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15ULL;
 
 double unit(std::uint64_t bits) noexcept { return static_cast<double>(bits & 0xFFFFU) * 0x1.0p-16; }
-
-Vector3 normal3(core::CounterRng& rng) noexcept {
-  Vector3 v;
-  for (int i = 0; i < 3; ++i) v[i] = rng.normal();
-  return v;
-}
 
 }  // namespace
 

@@ -11,6 +11,7 @@
 #include "core/random/counter_rng.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
+#include "platform/sitl/sensors/draws.hpp"
 
 namespace roborun::sitl {
 namespace {
@@ -19,7 +20,6 @@ constexpr std::uint64_t kStream = 0x100;  // the cameras' are 0 .. 7
 constexpr std::size_t kMostRays = 65536;
 
 Vector3 direction(const LidarRay& ray) noexcept {
-  constexpr double kDegree = core::kPi / 180.0;
   const double level = core::cos(ray.elevation_deg * kDegree);
   return {level * core::cos(ray.azimuth_deg * kDegree), level * core::sin(ray.azimuth_deg * kDegree),
           core::sin(ray.elevation_deg * kDegree)};

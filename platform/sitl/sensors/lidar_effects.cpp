@@ -4,20 +4,14 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
+#include "platform/sitl/sensors/draws.hpp"
 
 namespace roborun::sitl {
 namespace {
 
-constexpr double kDegree = core::kPi / 180.0;
 /// Flatter than this is an edge, not a surface.
 constexpr double kSteepest = 12.0;
 constexpr double kSpeck_m = 4.0;
-
-Vector3 normal3(core::CounterRng& rng) noexcept {
-  Vector3 v;
-  for (int i = 0; i < 3; ++i) v[i] = rng.normal();
-  return v;
-}
 
 }  // namespace
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
+#include "platform/sitl/sensors/draws.hpp"
 #include "platform/sitl/sensors/exposures.hpp"
 
 namespace roborun::sitl {
@@ -19,8 +20,6 @@ double wander(double value, double sigma, double correlation_s, double dt_s, cor
   const double decay = core::exp(-dt_s / correlation_s);
   return decay * value + std::sqrt(1.0 - decay * decay) * sigma * rng.normal();
 }
-
-constexpr double kDegree = core::kPi / 180.0;
 
 std::array<double, 3> to_array(const Vector3& v) noexcept { return {v.x(), v.y(), v.z()}; }
 

@@ -4,15 +4,12 @@
 #include <cstdint>
 
 #include "platform/sitl/world/byte_reader.hpp"
+#include "platform/sitl/world/file_bytes.hpp"
 
 namespace roborun::sitl {
 namespace {
 
 using Bytes = std::span<const unsigned char>;
-
-[[noreturn]] void refuse(const std::string& name, const std::string& what) {
-  throw InputError(fmt::format("{}: {}", name, what));
-}
 
 /// A number type of PCD or PLY.
 struct NumberType {

@@ -6,6 +6,7 @@
 
 #include "core/geometry/math.hpp"
 #include "platform/sitl/world/byte_reader.hpp"
+#include "platform/sitl/world/file_bytes.hpp"
 #include "platform/sitl/world/xml.hpp"
 
 namespace roborun::sitl {
@@ -13,10 +14,6 @@ namespace {
 
 using Bytes = std::span<const unsigned char>;
 using Element = Xml::Element;
-
-[[noreturn]] void refuse(const std::string& name, const std::string& what) {
-  throw InputError(fmt::format("{}: {}", name, what));
-}
 
 /// Three numbers of a text file, all finite.
 Vector3 point_of(std::string_view& line, std::size_t number, const std::string& name) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "platform/sitl/world/ray_span.hpp"
 #include "platform/sitl/world/voxel_grid.hpp"
 
 namespace roborun::sitl {
@@ -11,27 +12,16 @@ namespace {
 
 constexpr std::uint32_t kLeaf = 4;
 /// Deeper than any tree that halves 2^32 triangles.
-constexpr std::size_t kDeepest = 64;
+constexpr std::size_t kDeepestTree = 64;
 
 Aabb box_of(const Triangle& t) noexcept {
   return {t[0].cwiseMin(t[1]).cwiseMin(t[2]), t[0].cwiseMax(t[1]).cwiseMax(t[2])};
 }
 
 double enter_m(const Aabb& box, const Vector3& o, const Vector3& d) noexcept {
-  double enter = 0.0;
-  double leave = kInfinity;
-  for (int i = 0; i < 3; ++i) {
-    if (d[i] == 0.0) {
-      if (o[i] < box.min_W[i] || o[i] > box.max_W[i]) return kInfinity;
-      continue;
-    }
-    const double t0 = (box.min_W[i] - o[i]) / d[i];
-    const double t1 = (box.max_W[i] - o[i]) / d[i];
-    enter = std::max(enter, std::min(t0, t1));
-    leave = std::min(leave, std::max(t0, t1));
-  }
+  const RaySpan span = span_in(box, o, d);
   // A flat box and rounding must not lose a hit.
-  return enter > leave + 1e-9 * (1.0 + enter) ? kInfinity : enter;
+  return span.enter_m > span.leave_m + 1e-9 * (1.0 + span.enter_m) ? kInfinity : span.enter_m;
 }
 
 /// Moeller and Trumbore (1997). A border a little wider than the triangle: no ray slips between two of them.
@@ -140,7 +130,7 @@ double TriangleMesh::hit_distance_m(const Vector3& origin_W, const Vector3& dire
   if (node_.empty()) return kInfinity;
   double best_m = max_m;
   bool hit = false;
-  std::array<std::uint32_t, kDeepest> waiting;
+  std::array<std::uint32_t, kDeepestTree> waiting;
   std::size_t depth = 0;
   waiting[depth++] = 0;
   while (depth > 0) {
@@ -166,7 +156,7 @@ double TriangleMesh::hit_distance_m(const Vector3& origin_W, const Vector3& dire
 double TriangleMesh::clearance_m(const Vector3& p_W, double cap_m) const noexcept {
   if (node_.empty()) return cap_m;
   double best_m2 = cap_m * cap_m;
-  std::array<std::uint32_t, kDeepest> waiting;
+  std::array<std::uint32_t, kDeepestTree> waiting;
   std::size_t depth = 0;
   waiting[depth++] = 0;
   while (depth > 0) {

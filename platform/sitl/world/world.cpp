@@ -7,6 +7,7 @@
 
 #include "core/geometry/math.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/sitl/world/ray_span.hpp"
 
 namespace roborun::sitl {
 namespace {
@@ -43,19 +44,8 @@ double hit_pillar_m(const Pillar& pillar, const Vector3& o, const Vector3& d) no
 }
 
 double hit_box_m(const Aabb& box, const Vector3& o, const Vector3& d) noexcept {
-  double enter_m = 0.0;
-  double leave_m = kInfinity;
-  for (int i = 0; i < 3; ++i) {
-    if (d[i] == 0.0) {
-      if (o[i] < box.min_W[i] || o[i] > box.max_W[i]) return kInfinity;
-      continue;
-    }
-    const double t0 = (box.min_W[i] - o[i]) / d[i];
-    const double t1 = (box.max_W[i] - o[i]) / d[i];
-    enter_m = std::max(enter_m, std::min(t0, t1));
-    leave_m = std::min(leave_m, std::max(t0, t1));
-  }
-  return enter_m > leave_m ? kInfinity : enter_m;
+  const RaySpan span = span_in(box, o, d);
+  return span.enter_m > span.leave_m ? kInfinity : span.enter_m;
 }
 
 double pillar_distance_m(const Pillar& pillar, const Vector3& p) noexcept {

@@ -68,10 +68,6 @@ constexpr std::array kKnown{KnownKind{".toml", Kind::kToml, "TOML", ""},
 constexpr const char* kWanted =
     "a readable .toml, .bt, .ot, .world, .sdf, .pcd, .ply, .las, .stl, .obj or .dae file";
 
-[[noreturn]] void refuse(const std::string& path, const std::string& what) {
-  throw InputError(fmt::format("{}: {}", path, what));
-}
-
 Kind kind_of(const std::string& path) {
   for (const KnownKind& known : kKnown)
     if (path.ends_with(known.end)) return known.kind;

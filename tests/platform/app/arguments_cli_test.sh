@@ -46,7 +46,7 @@ refuses "(see roborun map convert --help)" map convert a.bt
 refuses "--env excludes --world" fly --world "$room" --env 3
 refuses "--env excludes --world" fly --env 14 --world "$room"
 refuses "--mission excludes --world" fly --world "$room" --mission search_and_rescue
-refuses "--start and --goal go with --world" fly --start 1,1,1
+refuses "--start, --goal and the like go with --world" fly --start 1,1,1
 refuses "--host-factor: goes with --profile host" fly --host-factor 2
 refuses "--host-factor: goes with --profile host" fly --profile paper --host-factor 1
 refuses "--host-file: goes with --profile host" fly --host-file x.toml

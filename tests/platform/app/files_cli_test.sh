@@ -291,7 +291,7 @@ check "no part stays" test -z "$(compgen -G '*.part')"
 # ---- a start, a goal or a climb that is not free
 refuses "start (5.00, 10.00, 2.00) is closer than" "$roborun" fly --world yard.bt --start 5,10,2 --goal 18,10,2
 refuses "goal (5.00, 10.00, 2.00) is closer than" "$roborun" fly --world yard.bt --start 2,2,2 --goal 5,10,2
-refuses "below the start: (15.00, 10.00, " "$roborun" fly --world yard.bt --start 15,10,2.5 --goal 2,2,2
+refuses "no room to climb to it from the ground at 0.00 m" "$roborun" fly --world yard.bt --start 13.6,10,2.5 --goal 2,2,2
 
 echo "$passed passed, $failed failed"
 [[ $failed -eq 0 && $passed -gt 100 ]]

@@ -6,10 +6,10 @@
 #include <memory>
 
 #include "platform/board/board_profile.hpp"
-#include "platform/flight/example/own_planner.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/mission/mission.hpp"
 #include "platform/sitl/world/world_file.hpp"
+#include "tests/support/busy_planner.hpp"
 
 namespace roborun::mission {
 namespace {
@@ -23,25 +23,6 @@ TEST(WorkRecord, IsBelievedUpToFiveTimesWhatItsWorkIsWorth) {
   EXPECT_FALSE(is_believable({"planner", 1.0, std::numeric_limits<double>::quiet_NaN()}));
 }
 
-/// Plans `repeats` times, and says `share` of the work.
-class BusyPlanner final : public stages::Planner {
- public:
-  BusyPlanner(int repeats, double share) noexcept : repeats_(repeats), share_(share) {}
-  [[nodiscard]] Status plan(const stages::PlanRequest& request, const stages::MapView& view,
-                            core::StageBudget& budget, stages::PlanResult& result) noexcept override {
-    Status status = Status::kNoPath;
-    for (int i = 0; i < repeats_; ++i) status = straight_.plan(request, view, budget, result);
-    result.work.units = static_cast<std::uint64_t>(share_ * static_cast<double>(result.work.units));
-    result.work.volume_m3 *= share_;
-    return status;
-  }
-
- private:
-  example::StraightPlanner straight_;
-  int repeats_;
-  double share_;
-};
-
 class WorkCheck : public ::testing::Test {
  protected:
   WorkCheck() : world_(sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {})) {
@@ -50,7 +31,7 @@ class WorkCheck : public ::testing::Test {
   }
   void plan_with(int repeats, double share) {
     config_.own.planner = [=](const board::PartRequest&) {
-      return std::make_unique<BusyPlanner>(repeats, share);
+      return std::make_unique<test::BusyPlanner>(repeats, share);
     };
   }
   [[nodiscard]] report::WorkRecord planner() const {
