@@ -233,7 +233,8 @@ void DecisionPipeline::remember(const DecisionInput& in) noexcept {
   ways_known_ = false;
   if (ways_ == nullptr) return;
   core::Work work;
-  if (ways_->look(map_.view(), in.p_WB, config_.horizon_m + 1.0, *draft_.planner_budget, work) != Status::kOk) return;
+  if (ways_->look(map_.view(), in.p_WB, config_.horizon_m + 1.0, *draft_.planner_budget, work) != Status::kOk)
+    return;
   ways_known_ = ways_->solve(draft_.start.p_W, in.goal_W, *draft_.planner_budget, work) == Status::kOk;
   draft_.planner_work.units += work.units;
 }

@@ -155,7 +155,7 @@ class DecisionPipeline {
   stages::Smoother& smoother_;
   stages::WayMemory* ways_;  ///< Null: the planner knows its horizon alone.
   bool ways_known_{false};   ///< In this decision.
-  stages::Path kept_W_;  ///< What was planned last.
+  stages::Path kept_W_;      ///< What was planned last.
   MotionWatch motion_;
   bool has_planned_{false};  ///< A plan was found since the take-off.
   Draft draft_;

@@ -47,7 +47,8 @@ struct SlowDown {
 /// When the judge ends a mission.
 struct JudgeConfig {
   double time_limit_s{7200.0};
-  double no_progress_s{120.0};  ///< Neither nearer to the goal nor far from where it was for so long: it is given up, hovering.
+  double no_progress_s{
+      120.0};  ///< Neither nearer to the goal nor far from where it was for so long: it is given up, hovering.
 };
 
 struct MissionConfig {

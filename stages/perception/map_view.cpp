@@ -15,7 +15,8 @@ double spacing_m(const MapView& view, double radius_m) noexcept {
 
 }  // namespace
 
-BlockContent read_cell_by_cell(const MapView& view, const Vector3& corner_W, CellBlock& cells, std::uint64_t& lookups) noexcept {
+BlockContent read_cell_by_cell(const MapView& view, const Vector3& corner_W, CellBlock& cells,
+                               std::uint64_t& lookups) noexcept {
   std::uint32_t free = 0, occupied = 0;
   cells = {};
   for (std::size_t row = 0; row < cells.free.size(); ++row) {

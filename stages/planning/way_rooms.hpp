@@ -13,7 +13,9 @@ namespace roborun::stages {
 /// Rooms 1 .. 7 are known, 8 .. 15 open; 0 is closed. What is more than fits the numbers joins the last one.
 inline constexpr unsigned kFirstOpenRoom = 8;
 inline constexpr unsigned kRooms = 16;
-[[nodiscard]] constexpr bool is_known_room(unsigned room) noexcept { return room > 0 && room < kFirstOpenRoom; }
+[[nodiscard]] constexpr bool is_known_room(unsigned room) noexcept {
+  return room > 0 && room < kFirstOpenRoom;
+}
 
 struct WayRooms {
   std::array<std::uint64_t, 256> number{};  ///< Of place x in row 16 z + y, in bits 4 x and up.

@@ -17,7 +17,9 @@ struct Scene {
     const double unknown = rng.uniform(0.0, 0.03), occupied = rng.uniform(0.0, 0.02);
     for (std::size_t i = 0; i < 8; ++i) {
       const double kind = rng.uniform();
-      cells.content[i] = kind < 0.15 ? BlockContent::kFree : kind < 0.25 ? BlockContent::kUnknown : BlockContent::kMixed;
+      cells.content[i] = kind < 0.15   ? BlockContent::kFree
+                         : kind < 0.25 ? BlockContent::kUnknown
+                                       : BlockContent::kMixed;
       cells.block[i] = &block[i];
       for (std::size_t row = 0; row < 256; ++row) {
         for (unsigned x = 0; x < 16; ++x) {
@@ -104,7 +106,8 @@ TEST(WayRooms, AreTheConnectedPlacesOfOneKind) {
           if (!seen[n]) seen[n] = true, stack.push_back(static_cast<std::int32_t>(n));
         };
         const std::int32_t x = i % 16, y = i / 16 % 16, z = i / 256;
-        visit(x + 1, y, z), visit(x - 1, y, z), visit(x, y + 1, z), visit(x, y - 1, z), visit(x, y, z + 1), visit(x, y, z - 1);
+        visit(x + 1, y, z), visit(x - 1, y, z), visit(x, y + 1, z), visit(x, y - 1, z), visit(x, y, z + 1),
+            visit(x, y, z - 1);
       }
       EXPECT_EQ(reached, all) << "room " << room << " of seed " << seed;
     }
