@@ -115,7 +115,7 @@ bool LatticeSearch::step(const Task& task, int side) noexcept {
     const auto& m = kMove[move];
     cost_[at] = cost_[index_of({cell.x - m[0], cell.y - m[1], cell.z - m[2]})] + units(step_m_);
   }
-  for (std::uint8_t next = 0; next < kMove.size(); ++next) {
+  for (std::size_t next = 0; next < kMove.size(); ++next) {
     const Cell to{cell.x + kMove[next][0], cell.y + kMove[next][1], cell.z + kMove[next][2]};
     if (!inside(to)) continue;
     const std::uint32_t index = index_of(to);
@@ -124,7 +124,7 @@ bool LatticeSearch::step(const Task& task, int side) noexcept {
       met_[static_cast<std::size_t>(1 - side)] = index;
       return true;
     }
-    push(side, index, cost_[at] + units(step_m_), next);
+    push(side, index, cost_[at] + units(step_m_), static_cast<std::uint8_t>(next));
   }
   return false;
 }

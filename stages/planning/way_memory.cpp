@@ -183,10 +183,11 @@ std::uint64_t WayMemory::cells_at(const Cell& block, const Cell& low, const Cell
   for (std::int32_t i = 0; i < 8; ++i) {
     const std::int32_t x = block.x - low.x + (i & 1), y = block.y - low.y + ((i >> 1) & 1),
                        z = block.z - low.z + (i >> 2);
-    const auto w = static_cast<std::size_t>((z * wide_y + y) * wide_x + x);
-    cells.block[static_cast<std::size_t>(i)] = &window_[w].cells;
-    cells.content[static_cast<std::size_t>(i)] = window_[w].content;
-    digest = core::mix64(digest + window_[w].digest + 1);
+    const std::int32_t w = (z * wide_y + y) * wide_x + x;
+    const Seen& seen = window_[static_cast<std::size_t>(w)];
+    cells.block[static_cast<std::size_t>(i)] = &seen.cells;
+    cells.content[static_cast<std::size_t>(i)] = seen.content;
+    digest = core::mix64(digest + seen.digest + 1);
   }
   return digest | 1U;
 }

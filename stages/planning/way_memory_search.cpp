@@ -24,7 +24,7 @@ double WayMemory::price(std::uint32_t position, unsigned room) const noexcept {
 
 std::uint32_t WayMemory::step_cost(const Cell& from, const Cell& to, double price) noexcept {
   const double length_m = kFinestCell_m * Vector3(from.x - to.x, from.y - to.y, from.z - to.z).norm();
-  return static_cast<std::uint32_t>(length_m / kUnit_m * price + 0.5);
+  return static_cast<std::uint32_t>(std::lround(length_m / kUnit_m * price));
 }
 
 void WayMemory::reach(std::uint32_t node, std::uint32_t cost, std::uint32_t next,

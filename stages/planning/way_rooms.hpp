@@ -20,7 +20,8 @@ inline constexpr unsigned kRooms = 16;
 struct WayRooms {
   std::array<std::uint64_t, 256> number{};  ///< Of place x in row 16 z + y, in bits 4 x and up.
   [[nodiscard]] unsigned at(std::int32_t x, std::int32_t y, std::int32_t z) const noexcept {
-    return static_cast<unsigned>(number[static_cast<std::size_t>(16 * z + y)] >> (4 * x)) & 15U;
+    const std::int32_t row = 16 * z + y;
+    return static_cast<unsigned>(number[static_cast<std::size_t>(row)] >> (4 * x)) & 15U;
   }
 };
 
