@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,13 @@ struct LatencySummary {
 };
 struct PrecisionSummary {
   double min{}, median{}, max{};
+};
+
+/// What a flight of a suite of worlds has besides.
+struct SuiteFlight {
+  bool possible{};      ///< The judge of ways finds one.
+  double shortest_m{};  ///< Its length; NaN without a way.
+  std::string command;  ///< That flies it again.
 };
 
 /// Names and order are those of the JSON object.
@@ -43,8 +51,9 @@ struct MissionResult {
   std::string map;
   std::string planner;
   std::string mission;
-  std::string reason;        ///< Why the mission ended.
-  double speed_limit_mps{};  ///< v_max of the design.
+  std::string reason;                ///< Why the mission ended.
+  double speed_limit_mps{};          ///< v_max of the design.
+  std::optional<SuiteFlight> suite;  ///< Three more keys, or none.
 };
 
 /// One decision, for traces and plots.
