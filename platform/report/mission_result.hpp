@@ -126,6 +126,16 @@ struct SafetyRecord {
   Vector3 end_W = Vector3::Zero();
 };
 
+/// What the vehicle's map knew at one height when the mission ended, from above.
+struct KnownSlice {
+  enum class Cell : std::uint8_t { kUnknown, kFree, kOccupied };
+  double height_m{};
+  double cell_m{};
+  double x_m{}, y_m{};  ///< Lowest corner.
+  int columns{}, rows{};
+  std::vector<Cell> cell;  ///< [row * columns + column].
+};
+
 struct MissionReport {
   MissionResult result;
   std::vector<DecisionRecord> decisions;
@@ -133,6 +143,7 @@ struct MissionReport {
   std::vector<PoolUse> pools;
   std::vector<WorkRecord> work;
   SafetyRecord safety;
+  KnownSlice known;  ///< Empty unless it was asked for.
 };
 
 /// What missions are compared by.
