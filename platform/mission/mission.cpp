@@ -32,11 +32,17 @@ report::KnownSlice known_slice(const stages::MapView& view, const Aabb& bounds_W
   const int y0 = block(bounds_W.min_W.y());
   const int blocks_x = block(bounds_W.max_W.x()) - x0 + 1;
   const int blocks_y = block(bounds_W.max_W.y()) - y0 + 1;
-  report::KnownSlice slice{height_m, kBlock_m / kBlockCells, x0 * kBlock_m, y0 * kBlock_m,
-                           blocks_x * kBlockCells, blocks_y * kBlockCells, {}};
+  report::KnownSlice slice{height_m,
+                           kBlock_m / kBlockCells,
+                           x0 * kBlock_m,
+                           y0 * kBlock_m,
+                           blocks_x * kBlockCells,
+                           blocks_y * kBlockCells,
+                           {}};
   slice.cell.resize(static_cast<std::size_t>(slice.columns) * static_cast<std::size_t>(slice.rows));
-  const int z = std::clamp(static_cast<int>(std::floor((height_m - block(height_m) * kBlock_m) / slice.cell_m)), 0,
-                           kBlockCells - 1);
+  const int z =
+      std::clamp(static_cast<int>(std::floor((height_m - block(height_m) * kBlock_m) / slice.cell_m)), 0,
+                 kBlockCells - 1);
   stages::CellBlock cells;
   std::uint64_t lookups = 0;
   for (int i = 0; i < blocks_x * blocks_y; ++i) {
@@ -55,7 +61,8 @@ report::KnownSlice known_slice(const stages::MapView& view, const Aabb& bounds_W
         if (of(cells.free)) cell = Cell::kFree;
         if (of(cells.occupied)) cell = Cell::kOccupied;
       }
-      slice.cell[static_cast<std::size_t>((row * kBlockCells + y) * slice.columns + column * kBlockCells + x)] = cell;
+      slice.cell[static_cast<std::size_t>((row * kBlockCells + y) * slice.columns + column * kBlockCells +
+                                          x)] = cell;
     }
   }
   return slice;
@@ -302,7 +309,8 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
   report_.result.collided = judge_.collided();
   report_.pools = setup_.pools();
   report_.work = work_of(timed_map_, timed_planner_);
-  if (config_.keep_known) report_.known = known_slice(system_.map().view(), world_.bounds_W(), world_.start_W().z());
+  if (config_.keep_known)
+    report_.known = known_slice(system_.map().view(), world_.bounds_W(), world_.start_W().z());
   record_failsafe();
   summarise(std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count());
   return std::move(report_);

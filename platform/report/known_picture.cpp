@@ -26,8 +26,8 @@ void draw_known(Svg& svg, const KnownSlice& known, const Aabb& bounds_W, const F
     const double low_y_m = std::max(y_m, bounds_W.min_W.y());
     const double high_y_m = std::min(y_m + known.cell_m, bounds_W.max_W.y());
     if (high_x_m <= low_x_m || high_y_m <= low_y_m) return;
-    svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="{}"/>)", f.x(low_x_m), f.y(high_y_m),
-            (high_x_m - low_x_m) * f.scale + 0.2, (high_y_m - low_y_m) * f.scale + 0.2, fill);
+    svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="{}"/>)", f.x(low_x_m),
+            f.y(high_y_m), (high_x_m - low_x_m) * f.scale + 0.2, (high_y_m - low_y_m) * f.scale + 0.2, fill);
   };
   for (int row = 0; row < known.rows; ++row) {
     const auto* cell = known.cell.data() + static_cast<std::ptrdiff_t>(row) * known.columns;
@@ -60,12 +60,14 @@ std::string known_svg(const Scene& scene, std::span<const MissionReport> mission
   svg.text(kLeft, 26, scene.title, "start", 15, kInk, "bold");
   const Quantity coloured = quantity(PathColour::kSpeed, missions);
   draw_legend(svg, coloured, kWidth - kRight, 40);
-  constexpr std::array<Key, 4> kKeys{
-      {{kFree, "known to be free", 140}, {kSeen, "known to be occupied", 170}, {kUnseen, "not known", 95}, {"#3e4c59", "obstacle (the truth)", 0}}};
+  constexpr std::array<Key, 4> kKeys{{{kFree, "known to be free", 140},
+                                      {kSeen, "known to be occupied", 170},
+                                      {kUnseen, "not known", 95},
+                                      {"#3e4c59", "obstacle (the truth)", 0}}};
   double x = kLeft;
   for (const Key& key : kKeys) {
-    svg.add(R"(<rect x="{:.1f}" y="80" width="13" height="13" fill="{}" stroke="{}" stroke-width="0.5"/>)", x, key.fill,
-            kSoft);
+    svg.add(R"(<rect x="{:.1f}" y="80" width="13" height="13" fill="{}" stroke="{}" stroke-width="0.5"/>)", x,
+            key.fill, kSoft);
     svg.text(x + 19, 91, key.text, "start", 13);
     x += key.width + 19;
   }
@@ -73,8 +75,9 @@ std::string known_svg(const Scene& scene, std::span<const MissionReport> mission
   for (const MissionReport& mission : missions) {
     const MissionResult& r = mission.result;
     svg.text(kLeft, y,
-             fmt::format("{}: {} in {:.0f} s, {:.0f} m flown, mean {:.2f} m/s; the map is cut {:g} m high", r.design,
-                         outcome(r), r.mission_time_s, r.distance_m, r.mean_velocity_mps, mission.known.height_m),
+             fmt::format("{}: {} in {:.0f} s, {:.0f} m flown, mean {:.2f} m/s; the map is cut {:g} m high",
+                         r.design, outcome(r), r.mission_time_s, r.distance_m, r.mean_velocity_mps,
+                         mission.known.height_m),
              "start", 13);
     const Frame f{scene.bounds_W.min_W.x(), scene.bounds_W.max_W.y(), scale, kLeft, y + 10};
     draw_world(svg, plain, f, panel, [&] { draw_known(svg, mission.known, scene.bounds_W, f); });
@@ -83,7 +86,8 @@ std::string known_svg(const Scene& scene, std::span<const MissionReport> mission
     y += panel + 56;
   }
   return svg.finish(kWidth, y - 20, scene.title,
-                    "Worlds from above: the way flown, coloured by speed, over what the vehicle's map knew to be free, knew to be "
+                    "Worlds from above: the way flown, coloured by speed, over what the vehicle's map knew "
+                    "to be free, knew to be "
                     "occupied, and did not know when the flight ended.");
 }
 

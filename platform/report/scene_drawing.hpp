@@ -39,7 +39,8 @@ struct Quantity {
 
 /// Bounds, congestion, obstacles, zones and axes, `height` points high. `below` (may be empty) draws what lies below the
 /// obstacles.
-void draw_world(Svg& svg, const Scene& scene, const Frame& f, double height, const std::function<void()>& below = {});
+void draw_world(Svg& svg, const Scene& scene, const Frame& f, double height,
+                const std::function<void()>& below = {});
 void draw_path(Svg& svg, const MissionReport& mission, const Frame& f, const Quantity& quantity);
 /// Of the path's colours; its right end is `right`.
 void draw_legend(Svg& svg, const Quantity& q, double right, double y);
