@@ -155,8 +155,7 @@ std::string digest_of_file(const std::string& path) { return "sha256 " + report:
 /// What was asked for, in front of what the run says of itself.
 void identify(const AuditOptions& options, const sitl::NamedEnvironment& environment,
               const vehicle::Vehicle& vehicle, report::AuditReport& result) {
-  const std::vector<std::string> shipped = vehicle::shipped_vehicles();
-  const bool is_shipped = std::find(shipped.begin(), shipped.end(), options.vehicle) != shipped.end();
+  const bool is_shipped = vehicle::ships(options.vehicle);
   const bool in_program = options.profile == "paper" || options.profile == "cortex-a72";
   const std::string profile = options.profile == "host" ? board::default_host_path({}) : options.profile;
   std::vector<std::pair<std::string, std::string>> asked{

@@ -66,6 +66,7 @@ struct MissionConfig {
   JudgeConfig judge{};
   std::vector<TimedFault> faults{};  ///< At most sitl::FaultLine::kMost.
   std::string record{};              ///< File for the recording of the flight; empty: none.
+  bool keep_known{false};            ///< report.known, at the height of the world's start.
   /// Called after every minor frame, may be empty: what a test measures.
   std::function<void(const FrameRecord&)> each_frame{};
 };

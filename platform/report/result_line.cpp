@@ -53,6 +53,8 @@ std::optional<MissionResult> from_line(const std::string& line) {
     r.mission = json.at("mission");
     r.reason = json.at("reason");
     r.speed_limit_mps = number(json.at("speed_limit_mps"));
+    if (json.contains("possible"))
+      r.suite = SuiteFlight{json.at("possible"), number(json.at("shortest_m")), json.at("command")};
     return r;
   } catch (const std::exception&) {
     return std::nullopt;

@@ -20,6 +20,7 @@ struct Scene {
     double x_m, y_m, width_m, height_m;
   };
   std::string title;
+  const char* background{"#f7f9fb"};
   Aabb bounds_W{};
   Vector3 start_W = Vector3::Zero();
   Vector3 goal_W = Vector3::Zero();

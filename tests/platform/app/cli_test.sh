@@ -45,7 +45,7 @@ refuses "cannot be loaded" calibrate --repeats 1 --planner plugin:nope.so
 refuses "must go with --host-file" fly --profile host --planner plugin:nope.so
 refuses "must be those that ship" sweep --planner plugin:nope.so --out /tmp/roborun_cli_test_sweep.$$
 refuses "must be own or ompl:NAME" fly --planner ompl:Foo
-refuses "deadline or all" fly --plot x.svg --color red
+refuses "deadline, all or known" fly --plot x.svg --color red
 refuses "package_delivery or search_and_rescue" fly --mission x
 refuses "cannot be opened" fly --world nope.toml
 refuses "must end in .toml, .bt or .ot" fly --world nope.xyz
