@@ -45,6 +45,7 @@ struct MissionResult {
   std::string mission;
   std::string reason;        ///< Why the mission ended.
   double speed_limit_mps{};  ///< v_max of the design.
+  bool believed{true};       ///< False: a plugin took more time than the work that it counted is worth.
 };
 
 /// One decision, for traces and plots.
