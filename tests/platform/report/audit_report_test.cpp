@@ -321,6 +321,7 @@ TEST(Verdict, FailsByEachFigureByName) {
   const std::vector<Case> cases{
       {"missing", [](AuditReport& r) { r.missing = {"memory lock: no"}; }},
       {"stopped", [](AuditReport& r) { r.stopped_by = "track"; }},
+      {"stopped", [](AuditReport& r) { r.interrupted = true; }},
       {"heap_calls", [](AuditReport& r) { r.heap_calls_after_start = 1; }},
       {"heap_calls", [](AuditReport& r) { r.heap_sealed = false; }},
       {"decisions_late", [](AuditReport& r) { r.decisions_too_late = 1; }},
