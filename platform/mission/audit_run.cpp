@@ -480,6 +480,8 @@ void RealTimeRun::fill_identity(report::AuditReport& report, const rt::IdleLaten
       {"nohz_full", id.nohz_full},
       {"idle_latency", idle.describe()},
       {"sched_rt_runtime_us", id.rt_runtime}};
+  if (report.interrupted)
+    report.identity.emplace_back("interrupted", fmt::format("after {:.1f} s", report.seconds));
 }
 
 report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress) {

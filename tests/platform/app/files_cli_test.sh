@@ -287,7 +287,7 @@ for signal in INT TERM HUP; do
   rm -f audit.html
   stops $signal "audit after .* of 600 s; the report is of that time" audit --seconds 600 --best-effort --profile paper --json --html audit.html
   check "an audit that $signal ends prints what it measured, as FAIL" \
-    python3 -c 'import json, sys; r = json.load(open("out")); sys.exit(not (r["interrupted"] and r["verdict"] == "fail" and 0 < r["seconds"] < 600 and r["lanes"][0]["frames"] > 0))'
+    python3 -c 'import json, sys; r = json.load(open("out")); sys.exit(not (r["interrupted"] and "interrupted" in r["identity"] and r["verdict"] == "fail" and 0 < r["seconds"] < 600 and r["lanes"][0]["frames"] > 0))'
   check "and writes it" grep -q "Interrupted: all figures are of the time until then" audit.html
   set +m
   check "the files before stay" test "$(cat flight.rec junit.xml)" = "$(printf 'before\nbefore')"

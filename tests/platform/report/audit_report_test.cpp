@@ -491,9 +491,9 @@ TEST(CompareAudits, OneHeapCallInOneRunIsARegressionWhateverTheNoise) {
 }
 
 TEST(CompareAudits, RefusesOtherFlightsAndMixedSidesAndNamesTheDifference) {
-  for (const char* key : {"rate_Hz", "asked_seconds", "environment", "seed", "profile", "profile_digest",
-                          "vehicle", "vehicle_digest", "settings", "settings_digest", "load", "bus",
-                          "kill_lines", "injected", "real_time"}) {
+  for (const char* key : {"rate_Hz", "asked_seconds", "interrupted", "environment", "seed", "profile",
+                          "profile_digest", "vehicle", "vehicle_digest", "settings", "settings_digest",
+                          "load", "bus", "kill_lines", "injected", "real_time"}) {
     AuditReport other = sample();
     std::erase_if(other.identity, [key](const auto& pair) { return pair.first == key; });
     other.identity.emplace_back(key, "other");
