@@ -135,6 +135,7 @@ TEST(OutputFile, WritesThroughWhatIsNoRegularFile) {
 
 TEST(OutputFile, StandardOutputGoesOnWhereItWas) {
   const std::string path = folder("stdout") / "out.txt";
+  (void)std::fflush(stdout);  // or the child would print it again
   const pid_t child = fork();
   if (child == 0) {
     const int fd = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
