@@ -160,7 +160,7 @@ int fly(const FlyOptions& options) {
   config.backends.planner = options.planner;
   std::vector<report::MissionReport> reports;
   bool all_reached = true;
-  bool believed = true;
+  bool all_believed = true;
   const input::StopOnSignal stop;
   for (const governor::Design design : designs) {
     config.flight.design = design;
@@ -183,7 +183,8 @@ int fly(const FlyOptions& options) {
     result.env = env;
     result.mission = options.world.empty() ? options.mission : "world_file";
     all_reached = all_reached && result.reached_goal && !result.collided;
-    believed = believes(options, reports.back()) && believed;
+    result.believed = believes(options, reports.back());
+    all_believed = all_believed && result.believed;
   }
 
   if (options.json) {
@@ -207,7 +208,7 @@ int fly(const FlyOptions& options) {
   if (!options.json && !options.plot.empty()) fmt::print("picture: {}\n", options.plot);
   if (!options.json && !options.trace.empty()) fmt::print("trace: {}\n", options.trace);
   if (!options.json && !options.record.empty()) fmt::print("recording: {}\n", options.record);
-  return all_reached && believed ? kDone : kNotGood;
+  return all_reached && all_believed ? kDone : kNotGood;
 }
 
 }  // namespace

@@ -72,8 +72,7 @@ struct MissionConfig {
 };
 
 /// The flight through `world`: its bounds, its goal, the height of its start, and the rest from `config`.
-/// Throws InputError for a rig that cannot be, and for a vehicle that has no room at the goal, the start or
-/// on the way up to it.
+/// Throws InputError for a rig that cannot be, and for a vehicle that has no room (sitl::why_no_room).
 [[nodiscard]] flight::FlightConfig flight_config_of(const sitl::World& world, const MissionConfig& config);
 /// This vehicle flies the mission.
 void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle);

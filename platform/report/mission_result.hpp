@@ -51,8 +51,9 @@ struct MissionResult {
   std::string map;
   std::string planner;
   std::string mission;
-  std::string reason;                ///< Why the mission ended.
-  double speed_limit_mps{};          ///< v_max of the design.
+  std::string reason;        ///< Why the mission ended.
+  double speed_limit_mps{};  ///< v_max of the design.
+  bool believed{true};       ///< False: a plugin took more time than the work that it counted is worth.
   std::optional<SuiteFlight> suite;  ///< Three more keys, or none.
 };
 

@@ -61,6 +61,11 @@ void draw_world(Svg& svg, const Scene& scene, const Frame& f, double height,
     svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="{:.2f}" fill="#3e4c59"/>)", f.x(c.x_m), f.y(c.y_m),
             std::max(c.radius_m * f.scale, 0.8));
   }
+  for (const auto& outline : scene.outlines) {
+    std::string points;
+    for (const auto& [x_m, y_m] : outline) points += fmt::format("{:.2f},{:.2f} ", f.x(x_m), f.y(y_m));
+    svg.add(R"(<polygon points="{}" fill="#3e4c59" stroke="#3e4c59" stroke-width="0.8"/>)", points);
+  }
   const std::array<const char*, 3> zone{"A", "B", "C"};
   std::vector<double> borders{scene.bounds_W.min_W.x()};
   borders.insert(borders.end(), scene.zone_borders_m.begin(), scene.zone_borders_m.end());

@@ -108,7 +108,7 @@ std::string mission_svg(const Scene& scene, std::span<const MissionReport> missi
     y += kChartHeight + 34;
   }
   svg.text(kLeft, y - 12,
-           "charts: over the way from start to goal, colours as the squares above; dark circles and boxes: "
+           "charts: over the way from start to goal, colours as the squares above; dark: "
            "obstacles; red: congestion",
            "start", 12, kSoft);
   return svg.finish(kWidth, y + 4);

@@ -103,7 +103,7 @@ TEST(WayRooms, AreTheConnectedPlacesOfOneKind) {
         const auto visit = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
           if (((x | y | z) & ~15) != 0 || rooms.at(x, y, z) != room) return;
           const std::int32_t n = x + 16 * y + 256 * z;
-          if (auto& met = seen[static_cast<std::size_t>(n)]; !met) met = true, stack.push_back(n);
+          if (auto&& met = seen[static_cast<std::size_t>(n)]; !met) met = true, stack.push_back(n);
         };
         const std::int32_t x = i % 16, y = i / 16 % 16, z = i / 256;
         visit(x + 1, y, z), visit(x - 1, y, z), visit(x, y + 1, z), visit(x, y - 1, z), visit(x, y, z + 1),
