@@ -67,14 +67,14 @@ sitl::WorldOptions world_options(const WorldArguments& arguments, double radius_
   if (const auto z = numbers<1>("--ground", arguments.ground, "a height in metres"))
     options.ground_m = (*z)[0];
   if (const auto cell = numbers<1>("--cell", arguments.cell, "a size in metres")) options.cell_m = (*cell)[0];
-  options.scale = arguments.scale;
+  if (arguments.scale > 0.0) options.scale = arguments.scale;
   options.surfaces = arguments.surfaces;
   options.radius_m = radius_m;
   return options;
 }
 
 bool any_given(const WorldArguments& a) {
-  return !(a.start + a.goal + a.bounds + a.ground + a.cell).empty() || a.scale != 1.0 || a.surfaces;
+  return !(a.start + a.goal + a.bounds + a.ground + a.cell).empty() || a.scale > 0.0 || a.surfaces;
 }
 
 }  // namespace roborun::app

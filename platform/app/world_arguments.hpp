@@ -14,7 +14,7 @@ struct WorldArguments {
   std::string bounds;
   std::string ground;
   std::string cell;
-  double scale{1.0};
+  double scale{0.0};  ///< 0: not given.
   bool surfaces{false};
 };
 

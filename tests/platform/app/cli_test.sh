@@ -61,6 +61,7 @@ refuses "must be X,Y,Z,X,Y,Z" world check "$data/worlds/two_pillars.toml" --boun
 refuses "goes with point clouds" world check "$data/worlds/two_pillars.toml" --cell 0.1
 refuses "does not go with .toml" fly --world "$data/worlds/two_pillars.toml" --scale 2
 refuses "go with --world" fly --cell 0.1
+refuses "go with --world" fly --scale 1
 refuses "must be forest, maze" world make jungle
 refuses "must be from 0.4 to 20" world make maze --width 0
 refuses "does not go with forest" world make forest --width 3
