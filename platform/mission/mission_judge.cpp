@@ -91,7 +91,7 @@ const char* MissionJudge::judge(MonotonicTime now) {
   if (s.battery_ratio <= 0.0) return "battery_empty";
   if (give_up_ == nullptr) {
     if (system_.decision_program().no_way() >= kProof) give_up_ = "no_way";
-    if (give_up_ == nullptr && seconds(now - best_at_) > config_.no_progress_s) give_up_ = "no_path_to_goal";
+    if (give_up_ == nullptr && seconds(now - best_at_) > config_.no_progress_s) give_up_ = "gave_up";
     if (seconds(now.time_since_epoch()) > config_.time_limit_s) give_up_ = "time_limit";
     if (give_up_ == nullptr) return nullptr;
     system_.decision_program().give_up();

@@ -18,9 +18,9 @@
 namespace roborun::mission {
 namespace {
 
-constexpr std::array<const char*, 11> kOutcomes{"reached_goal",    "landed",    "holding",    "terminated",
-                                                "killed",          "collision", "time_limit", "battery_empty",
-                                                "no_path_to_goal", "no_way",    "struck"};
+constexpr std::array<const char*, 11> kOutcomes{"reached_goal", "landed",    "holding",    "terminated",
+                                                "killed",       "collision", "time_limit", "battery_empty",
+                                                "gave_up",      "no_way",    "struck"};
 
 class ScenarioReader {
  public:

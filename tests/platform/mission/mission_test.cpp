@@ -103,7 +103,7 @@ TEST(Mission, EndsSafelyWithANamedReasonWhereTheGoalIsWalledIn) {
   const report::MissionReport report = fly_mission(world, paper_mission(governor::Design::kAware, 1), {});
   EXPECT_FALSE(report.result.reached_goal);
   EXPECT_FALSE(report.result.collided);
-  EXPECT_EQ(report.result.reason, "no_path_to_goal");
+  EXPECT_EQ(report.result.reason, "no_way");
   EXPECT_LT(report.path.back().speed_mps, 0.5) << "hovering";
 }
 

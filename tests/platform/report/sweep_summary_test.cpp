@@ -116,9 +116,9 @@ TEST(SweepSummary, TheTableNamesEachMissionThatFailedAndTheJsonHasTheAgreedField
   std::vector<SweepRow> rows{row("1", "aware", 1, 4.0), row("2", "aware", 1, 8.0),
                              row("1", "static", 1, 0.5)};
   rows[1].result.reached_goal = false;
-  rows[1].result.reason = "no_path_to_goal";
+  rows[1].result.reason = "gave_up";
   const std::string table = sweep_table(rows);
-  EXPECT_NE(table.find("environment 2, paper, aware, seed 1: no_path_to_goal"), std::string::npos) << table;
+  EXPECT_NE(table.find("environment 2, paper, aware, seed 1: gave_up"), std::string::npos) << table;
   EXPECT_NE(table.find("aware against static                        1        8.00"), std::string::npos)
       << table;
   const auto json = nlohmann::json::parse(sweep_json("paper27", rows, true));

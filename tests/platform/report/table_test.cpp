@@ -29,9 +29,9 @@ TEST(ComparisonTable, GivesNoRatioAgainstABaselineThatFailed) {
   std::vector<MissionResult> results = {test::sample_mission("aware", 4.0).result,
                                         test::sample_mission("static", 0.5).result};
   results[1].reached_goal = false;
-  results[1].reason = "no_path_to_goal";
+  results[1].reason = "gave_up";
   EXPECT_EQ(comparison_table(results).find("x v"), std::string::npos);
-  EXPECT_NE(comparison_table(results).find("no_path_to_goal"), std::string::npos);
+  EXPECT_NE(comparison_table(results).find("gave_up"), std::string::npos);
 }
 
 }  // namespace
