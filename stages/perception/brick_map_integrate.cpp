@@ -9,6 +9,13 @@
 namespace roborun::stages {
 namespace {
 
+/// So often must something thin not be met where it should be until it is believed to be gone.
+constexpr double kThinPatience = 4.0;
+/// What is no wider may be a pole or a branch, but no body: half of the narrowest one.
+constexpr double kThinMost_m = 0.2;
+constexpr double kMoved_m = 1.5;  // about twice a body's radius
+/// Surfaces differ by more than this at a step, besides the error of the depth.
+constexpr double kStep_m = 0.25;
 constexpr double kOrderStep_m = 0.5;  // blocks whose distances differ by less keep their order in space
 constexpr int kBlockLevel = kBrickLevel + 1;
 constexpr int kTileLevel = 2;  // where a tile may end is known in cells of this size
@@ -28,10 +35,26 @@ int tile_shift(const firmware_if::DepthFrame& frame, int level) noexcept {
   return shift;
 }
 
+/// The depth at which a pixel ends a cell's edge beside where it says (one sigma).
+double exact_reach_m(const DepthError& error) noexcept {
+  const double a = error.quadratic_per_m, b = error.angle_rad;
+  const double room_m = std::max(kFinestCell_m - error.constant_m - error.place_m, 0.0);
+  // a z^2 + b z = room
+  const double root = b + std::sqrt(b * b + 4.0 * a * room_m);
+  return root > 0.0 ? std::min(2.0 * room_m / root, static_cast<double>(kMaxRange_m))
+                    : static_cast<double>(kMaxRange_m);
+}
+
+bool moved_nearby(std::span<const Vector3> moved_W, const Vector3& p_W) noexcept {
+  return std::any_of(moved_W.begin(), moved_W.end(),
+                     [&p_W](const Vector3& m_W) { return (m_W - p_W).squaredNorm() < kMoved_m * kMoved_m; });
+}
+
 }  // namespace
 
 std::size_t BrickMap::usable_frames(const IntegrationRequest& request, IntegrationResult& result) noexcept {
   std::size_t clouds = 0;
+  bool any = false;
   cameras_.count = 0;
   guard_.begin(request.frames);
   for (std::size_t i = 0; i < request.frames.size(); ++i) {
@@ -40,13 +63,13 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
     // All pixels are read once, by the pyramid: it counts what the guard has to know.
     if (image == nullptr || check_shape(posed) != Status::kOk ||
         image->build(posed.frame, tile_shift(posed.frame, request.level)) != Status::kOk ||
-        guard_.check(posed, image->informed_count()) != Status::kOk ||
-        (!image->shows_surface() && is_white(posed, request.moved_W))) {
+        guard_.check_content(posed) != Status::kOk ||
+        (!image->shows_surface() && image->shows_anything() && is_white(posed, request.moved_W))) {
       ++result.frames_refused;
       continue;
     }
-    cameras_.camera[cameras_.count].prepare(posed, *image,
-                                            {config_.depth_margin_m, config_.depth_margin_quadratic_per_m});
+    cameras_.camera[cameras_.count].prepare(posed, *image);
+    any = any || image->shows_anything();
     clouds += posed.is_cloud ? 1U : 0U;
     frame_of_[cameras_.count++] = i;
   }
@@ -54,7 +77,7 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
   const std::size_t images = cameras_.count - clouds;
   cameras_.complete =
       clouds > 0 ? images == 0 && clouds == CloudImages::kImages : images == config_.all_around_frames;
-  return cameras_.count;
+  return any ? cameras_.count : 0;
 }
 
 std::size_t BrickMap::unit_index(const Position& unit) const noexcept {
@@ -89,16 +112,10 @@ Vector3 BrickMap::unit_center_W(const Position& unit) const noexcept {
 bool BrickMap::is_white(const PosedDepthFrame& posed, std::span<const Vector3> moved_W) const noexcept {
   constexpr int kRays = 8;          // in each direction
   constexpr int kLeastBlocked = 3;  // one may be a stray cell
-  constexpr double kMoved_m = 1.5;  // about twice a body's radius
-  constexpr double kStep_m = 0.5 * kBrick_m, kFineStep_m = 0.5 * kFinestCell_m;
+  constexpr double kBrickStep_m = 0.5 * kBrick_m, kFineStep_m = 0.5 * kFinestCell_m;
   const firmware_if::DepthFrame& frame = posed.frame;
   if (posed.is_cloud) return false;
   const double end_m = 0.8 * static_cast<double>(frame.range_m);
-  const auto moved_nearby = [&moved_W](const Vector3& p_W) {
-    return std::any_of(moved_W.begin(), moved_W.end(), [&p_W](const Vector3& m_W) {
-      return (m_W - p_W).squaredNorm() < kMoved_m * kMoved_m;
-    });
-  };
   Cell cell{};
   const auto brick_around = [&](const Vector3& p_W) -> const Brick* {
     if (!cell_of(p_W, cell)) return nullptr;
@@ -107,16 +124,16 @@ bool BrickMap::is_white(const PosedDepthFrame& posed, std::span<const Vector3> m
   const auto meets_surface = [&](const Vector3& ray_W) {
     const double length = ray_W.norm();
     bool near_end = true;  // The brick at that end of the piece has a surface.
-    for (double far_m = kStep_m / length; far_m < end_m; far_m += kStep_m / length) {
+    for (double far_m = kBrickStep_m / length; far_m < end_m; far_m += kBrickStep_m / length) {
       const Brick* brick = brick_around(posed.X_WC.p_RT + far_m * ray_W);
       const bool far_end = brick != nullptr && (brick->flags(kBrickLevel, 0) & content::kOccupied) != 0;
       if (!std::exchange(near_end, far_end) && !far_end) continue;
-      for (double at_m = far_m - kStep_m / length; at_m < far_m; at_m += kFineStep_m / length) {
+      for (double at_m = far_m - kBrickStep_m / length; at_m < far_m; at_m += kFineStep_m / length) {
         const Vector3 at_W = posed.X_WC.p_RT + at_m * ray_W;
         brick = brick_around(at_W);
         if (brick != nullptr &&
             evidence::is_occupied(brick->cell(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)))))
-          return !moved_nearby(at_W);
+          return !moved_nearby(moved_W, at_W);
       }
     }
     return false;
@@ -216,8 +233,14 @@ void BrickMap::clear_brick(const Position& at, std::uint8_t cameras, int finest,
   if (seen_.count == 0 || slot_[slot_of(at.x, at.y, at.z)] <= kFreeBrick) return;
   Brick* const brick = touch(at.x, at.y, at.z);
   if (brick == nullptr) return;  // pool full, and nothing farther away to give up
-  for (std::size_t i = 0; i < seen_.count; ++i)
-    brick->add_free(seen_.group[i].level, seen_.group[i].parent, seen_.group[i].free);
+  const bool thin = counts_for_the_thin(at.x, at.y, at.z);
+  for (std::size_t i = 0; i < seen_.count; ++i) {
+    const FreeGroup& group = seen_.group[i];
+    if (group.in_part != group.free)
+      brick->add_free(group.level, group.parent, static_cast<std::uint8_t>(group.free & ~group.in_part),
+                      {false, thin});
+    if (group.in_part != 0) brick->add_free(group.level, group.parent, group.in_part, {true, thin});
+  }
   refresh(*brick);  // while it is in the cache
 }
 
@@ -306,8 +329,18 @@ void BrickMap::add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_
   const firmware_if::DepthFrame& frame = camera.posed->frame;
   PixelLine line = camera.line;
   line.first = direction(camera, static_cast<double>(u0) + 0.5, static_cast<double>(v) + 0.5, kFinestCell_m);
-  end_cells(line, frame.depth_m.subspan(v * frame.width + u0, u1 - u0), {frame.range_min_m, frame.range_m},
-            row_);
+  tell_pixels(frame, v, u0, u1, camera.kinds, pixels_);
+  const auto depth_m = std::span(pixels_.depth_m).first(u1 - u0);
+  end_cells(line, depth_m, {frame.range_min_m, std::min(camera.exact_m, frame.range_m)}, row_);
+  add_cells(camera, false, work);
+  if (camera.exact_m < frame.range_m) {
+    end_cells(line, depth_m, {camera.exact_m, frame.range_m}, row_);
+    add_cells(camera, true, work);
+  }
+  if (pixels_.any_thin) add_thin_pixels(camera, line);
+}
+
+void BrickMap::add_cells(const SurfaceCamera& camera, bool vague, core::Work& work) noexcept {
   std::size_t last_position = slot_.size();
   Brick* brick = nullptr;
   for (std::size_t n = 0; n < row_.count; ++n) {
@@ -320,8 +353,33 @@ void BrickMap::add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_
       brick = paid(bx, by, bz) ? surface_brick(bx, by, bz, camera.is_coarse()) : nullptr;
     }
     if (brick == nullptr) continue;
-    brick->add_hit(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)));
+    const std::uint32_t morton = morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z));
+    vague ? brick->add_vague_hit(morton) : brick->add_hit(morton);
     ++work.units;
+  }
+}
+
+void BrickMap::add_thin_pixels(const SurfaceCamera& camera, const PixelLine& line) noexcept {
+  for (std::size_t word = 0; word < pixels_.thin.size(); ++word) {
+    for (std::uint64_t bits = pixels_.thin[word]; bits != 0; bits &= bits - 1) {
+      const std::size_t u = 64 * word + static_cast<std::size_t>(std::countr_zero(bits));
+      const float depth_m = pixels_.depth_m[u];
+      if (!(depth_m < camera.thin_reach_m)) continue;
+      Vector3 p;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto k = static_cast<std::size_t>(axis);
+        p[axis] = line.origin[k] + static_cast<double>(line.rest[k]) +
+                  static_cast<double>(depth_m) * (static_cast<double>(line.first[k]) +
+                                                  static_cast<double>(u) * static_cast<double>(line.step[k]));
+      }
+      const Vector3 p_W = corner_W_ + kFinestCell_m * p;
+      Cell cell{};
+      if (!cell_of(p_W, cell) || moved_nearby(camera.moved_W, p_W)) continue;
+      const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
+      if (!paid(bx, by, bz)) continue;
+      if (Brick* brick = surface_brick(bx, by, bz, camera.is_coarse()))
+        brick->add_thin(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)));
+    }
   }
 }
 
@@ -418,6 +476,13 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work)
     camera.column_pitch = 2.0 * static_cast<double>(frame.tan_half_width) / frame.width;
     camera.row_pitch = 2.0 * static_cast<double>(frame.tan_half_height) / frame.height;
     const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kFinestCell_m;
+    const DepthError& error = camera.posed->error;
+    camera.kinds = {static_cast<float>(kStep_m + SightCamera::kSigmas * error.constant_m),
+                    static_cast<float>(SightCamera::kSigmas * error.quadratic_per_m), error.mixes};
+    camera.exact_m = static_cast<float>(exact_reach_m(error));
+    camera.thin_reach_m = std::min(
+        camera.exact_m, static_cast<float>(kThinMost_m / std::max(camera.column_pitch, camera.row_pitch)));
+    camera.moved_W = request.moved_W;
     camera.line.low = {low_.x, low_.y, low_.z};
     camera.line.high = {high_.x, high_.y, high_.z};
     for (int axis = 0; axis < 3; ++axis) {
@@ -443,6 +508,12 @@ Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget&
   ++counters_.scans;
   free_now_ = kFreeBrick - 1 - static_cast<std::int32_t>(counters_.scans % kFreeStamps);
   vehicle_W_ = cameras_.camera[0].p_WC - request.frames[frame_of_[0]].p_BC_W;
+  double pitch = 0.0;
+  for (std::size_t i = 0; i < cameras_.count; ++i)
+    pitch = std::max({pitch, 1.0 / static_cast<double>(cameras_.camera[i].columns_per_tan),
+                      1.0 / static_cast<double>(cameras_.camera[i].rows_per_tan)});
+  thin_reach_m_ = std::ldexp(config_.thinnest_m / (kThinPatience * pitch),
+                             std::countr_zero(counters_.scans | std::uint64_t{1} << 20U));
   const std::size_t count = order_units(request);
   const std::size_t done = clear_units(count, request, budget, result.work);
   reach_m_ = done < count ? 0.0 : std::numeric_limits<double>::infinity();
