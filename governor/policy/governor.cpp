@@ -16,6 +16,7 @@ constexpr double kStaticV1_m3 = 150e3;
 constexpr double kStaticV2_m3 = 150e3;
 constexpr double kAwareV0_m3 = 60e3;
 constexpr double kAwareV1_m3 = 1e6;
+constexpr double kRemembered_m3 = 6e3;
 constexpr double kStaticSpeed_mps = 0.5;
 
 double sum(const core::StageArray<double>& stage_s) noexcept {
@@ -271,7 +272,8 @@ SolverProblem Governor::problem_of(const Task& task, const Precision& precision,
   p.g_avg_m = cell_size_m(precision.coarsest);
   p.d_obs_m = std::fmax(profile.closest_obstacle_m, cell_size_m(precision.coarsest));
   p.p1_coarsest_level = precision.coarsest;
-  p.v_sensor_m3 = task.see_m3;
+  // A way back leads through what no camera sees now: the planner gets so much of what the map holds all the same.
+  p.v_sensor_m3 = std::fmax(task.see_m3, kRemembered_m3);
   p.v_map_m3 = profile.map_volume_m3 > 0.0 ? profile.map_volume_m3 : 0.0;
   p.v0_max_m3 = std::min(kAwareV0_m3, precision.share * task.see_m3);
   p.v1_max_m3 = kAwareV1_m3;

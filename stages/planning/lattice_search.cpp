@@ -30,9 +30,15 @@ std::uint32_t units(double length_m) noexcept {
 
 LatticeSearch::LatticeSearch(std::size_t max_nodes, core::Arena& arena) noexcept
     : state_(arena.take<std::uint8_t>(max_nodes, "lattice states")),
-      cost_(arena.take<std::uint32_t>(max_nodes, "lattice costs")) {
+      state_pool_(arena.last_pool()),
+      cost_(arena.take<std::uint32_t>(max_nodes, "lattice costs")),
+      cost_pool_(arena.last_pool()) {
   side_[0].heap = arena.take<std::uint64_t>(kHeap, "lattice heap, start");
+  side_[0].pool = &arena.last_pool();
   side_[1].heap = arena.take<std::uint64_t>(kHeap, "lattice heap, goal");
+  side_[1].pool = &arena.last_pool();
+  // Most flights need none of it.
+  for (core::PoolRecord* pool : {&state_pool_, &cost_pool_, side_[0].pool, side_[1].pool}) pool->use(0);
 }
 
 bool LatticeSearch::lay_out(const PlanRequest& request, int cells) noexcept {
@@ -53,6 +59,8 @@ bool LatticeSearch::lay_out(const PlanRequest& request, int cells) noexcept {
   }
   if (nodes > static_cast<double>(state_.size())) return false;
   size_ = {count[0], count[1], count[2]};
+  state_pool_.use(static_cast<std::size_t>(nodes));
+  cost_pool_.use(static_cast<std::size_t>(nodes));
   std::fill_n(state_.begin(), static_cast<std::size_t>(nodes), std::uint8_t{0});
   for (Side& side : side_) side.count = 0;
   side_[0].from_W = side_[1].to_W = request.start_W;
@@ -72,6 +80,7 @@ void LatticeSearch::push(int side, std::uint32_t index, std::uint32_t cost, std:
   }
   state |= opened;
   const std::uint64_t promise = cost + kWeight * units((s.to_W - at_W(index)).norm());
+  s.pool->use(s.count + 1);
   s.heap[s.count++] = (((promise << kIndexBits) | index) << 3U) | move;
   std::push_heap(s.heap.begin(), s.heap.begin() + static_cast<std::ptrdiff_t>(s.count), std::greater<>());
 }

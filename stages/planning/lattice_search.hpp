@@ -44,6 +44,7 @@ class LatticeSearch {
   /// One of the two ends: what it has opened and not yet closed, least promise first.
   struct Side {
     std::span<std::uint64_t> heap;
+    core::PoolRecord* pool{};
     std::size_t count{};
     Vector3 from_W = Vector3::Zero(), to_W = Vector3::Zero();
   };
@@ -76,7 +77,9 @@ class LatticeSearch {
   }
 
   std::span<std::uint8_t> state_;
+  core::PoolRecord& state_pool_;
   std::span<std::uint32_t> cost_;  ///< Millimetres from its end, of closed nodes.
+  core::PoolRecord& cost_pool_;
   std::array<Side, 2> side_{};
   Vector3 corner_W_ = Vector3::Zero();
   double step_m_{};

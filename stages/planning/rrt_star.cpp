@@ -17,6 +17,7 @@ constexpr double kVisitedCell_m3 = kVisitedCell_m * kVisitedCell_m * kVisitedCel
 constexpr double kGoalBias = 0.15;
 constexpr double kEscape_m = 2.0;
 constexpr std::uint64_t kSpare = 4096;  // lookups that are granted whatever the budget says
+constexpr double kKnownReach_m = 15.0;
 constexpr double kLookAhead_m = 12.0;   // beyond a path's end
 // What a surface right ahead of a path's end costs: the way around a pillar.
 constexpr double kDetour_m = 10.0;
@@ -26,6 +27,13 @@ Vector3 towards_goal(const PlanRequest& request) noexcept {
   const double distance_m = way.norm();
   return distance_m <= request.horizon_m ? request.goal_W
                                          : Vector3(request.start_W + way * (request.horizon_m / distance_m));
+}
+
+/// False if the ways to the goal lead elsewhere: a step straight at it should save half its length of them.
+bool leads_on(const PlanRequest& request, const Vector3& target_W) noexcept {
+  if (request.ways == nullptr) return true;
+  const double saved_m = request.ways->to_goal_m(request.start_W) - request.ways->to_goal_m(target_W);
+  return saved_m >= 0.5 * (target_W - request.start_W).norm();
 }
 
 using Samples = core::StaticVector<Vector3, 2 * kMaxWaypoints>;
@@ -320,7 +328,7 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
       if (is_segment_free(spare_view, request.start_W, end_W, request.radius_m, work.units) && may_add())
         best = add_node(end_W, 0, work);
     }
-    if (best > 0 && free_m >= to_target_m && request.bounds_W.contains(target_W)) {
+    if (best > 0 && free_m >= to_target_m && request.bounds_W.contains(target_W) && leads_on(request, target_W)) {
       extract(request, spare_view, best, result);
       result.reaches_goal = target_W == request.goal_W;
       return goal_bad ? Status::kGoalBlocked : Status::kOk;
@@ -332,12 +340,15 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
 
 bool RrtStar::follow_ways(Search& s, const MapView& map, double below_m, PlanResult& result) noexcept {
   std::array<Vector3, kMaxWaypoints> way_W;
-  const std::size_t count = s.request.ways->known_way(s.request.start_W, s.request.horizon_m - 1.0, way_W);
+  // What is known may be farther away than sensors reach.
+  const double reach_m = std::fmax(s.request.horizon_m, kKnownReach_m);
+  const std::size_t count = s.request.ways->known_way(s.request.start_W, reach_m - 1.0, way_W);
   for (std::size_t i = count; i-- > 0;) {
     const double rest_m = kUnknownWeight * s.request.ways->to_goal_m(way_W[i]);
     if ((way_W[i] - s.request.start_W).norm() < 1.0 || !((way_W[i] - s.request.start_W).norm() + rest_m < below_m)) continue;
     PlanRequest request = s.request;
     request.goal_W = way_W[i];
+    request.horizon_m = reach_m;
     if (!map.is_free(Aabb::around(request.goal_W, request.radius_m), s.work.units)) continue;
     Search to_it{request, s.view, s.budget, s.work, s.rng};
     clear(to_it);

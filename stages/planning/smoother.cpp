@@ -377,6 +377,29 @@ bool append_rest_to_rest(const Vector3& from_W, const Vector3& to_W, const Motio
   return true;
 }
 
+namespace {
+
+/// Of the curve between two times, along a chord. Around a slanting chord there is more than the vehicle touches, around
+/// parts of it there is less.
+bool is_chord_free(const MapView& view, const Trajectory& trajectory, double from_s, double to_s, double radius_m,
+                   std::uint64_t& lookups) noexcept {
+  constexpr int kParts = 8;
+  const Vector3 r = Vector3::Constant(radius_m);
+  const auto is_swept_free = [&](const Vector3& a_W, const Vector3& b_W) {
+    return view.is_free({a_W.cwiseMin(b_W) - r, a_W.cwiseMax(b_W) + r}, lookups);
+  };
+  Vector3 last_W = trajectory.at_s(from_s).p_W;
+  if (is_swept_free(last_W, trajectory.at_s(to_s).p_W)) return true;
+  for (int part = 1; part <= kParts; ++part) {
+    const Vector3 p_W = trajectory.at_s(from_s + (to_s - from_s) * part / kParts).p_W;
+    if (!is_swept_free(last_W, p_W)) return false;
+    last_W = p_W;
+  }
+  return true;
+}
+
+}  // namespace
+
 double free_until_s(const MapView& view, const Trajectory& trajectory, double from_s, double radius_m,
                     std::uint64_t& lookups, std::size_t* segment) noexcept {
   constexpr double kForEver = std::numeric_limits<double>::infinity();
@@ -384,24 +407,20 @@ double free_until_s(const MapView& view, const Trajectory& trajectory, double fr
   if (trajectory.segment_count == 0)
     return view.is_free(Aabb::around(trajectory.hold_W, radius_m), lookups) ? kForEver : start_s;
   double segment_begin_s = 0.0;
-  Vector3 last_W = trajectory.at_s(start_s).p_W;
   for (std::size_t k = 0; k < trajectory.segment_count; ++k) {
     const double duration_s = trajectory.segment[k].duration_s;
     const double first_s = std::max(start_s - segment_begin_s, 0.0);
     if (first_s <= duration_s) {
       // Chords of about the vehicle's radius; at 6 m/s the curve leaves such a chord by less than 2 cm.
-      const double length_m = (trajectory.at_s(segment_begin_s + duration_s).p_W - last_W).norm() + 0.1;
+      const Vector3 from_W = trajectory.at_s(segment_begin_s + first_s).p_W;
+      const double length_m = (trajectory.at_s(segment_begin_s + duration_s).p_W - from_W).norm() + 0.1;
       const int count = std::clamp(static_cast<int>(2.0 * length_m / radius_m), 6, 200);
-      for (int i = 1; i <= count; ++i) {
-        const Vector3 p_W =
-            trajectory.at_s(segment_begin_s + first_s + (duration_s - first_s) * i / count).p_W;
-        const Aabb swept{last_W.cwiseMin(p_W) - Vector3::Constant(radius_m),
-                         last_W.cwiseMax(p_W) + Vector3::Constant(radius_m)};
-        if (!view.is_free(swept, lookups)) {
-          if (segment != nullptr) *segment = k;
-          return segment_begin_s + first_s + (duration_s - first_s) * (i - 1) / count;
-        }
-        last_W = p_W;
+      const double step_s = (duration_s - first_s) / count;
+      for (int i = 0; i < count; ++i) {
+        const double at_s = segment_begin_s + first_s + i * step_s;
+        if (is_chord_free(view, trajectory, at_s, at_s + step_s, radius_m, lookups)) continue;
+        if (segment != nullptr) *segment = k;
+        return at_s;
       }
     }
     segment_begin_s += duration_s;

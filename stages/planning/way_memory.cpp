@@ -16,6 +16,8 @@ constexpr std::int32_t kWindow = 13, kWindowHeight = 9;  // blocks of one look, 
 constexpr std::size_t kWindowBlocks =
     static_cast<std::size_t>(kWindow + 1) * (kWindow + 1) * (kWindowHeight + 1);
 constexpr double kMost_m = 1e5;
+constexpr double kStands_m = 0.3;          // from one look to the next
+constexpr std::uint32_t kMostWaits = 128;
 constexpr std::uint64_t kWorkOfABlock = 64;  // lookups that a block that changed counts as
 
 std::int32_t whole(double x) noexcept { return static_cast<std::int32_t>(std::floor(x)); }
@@ -62,31 +64,27 @@ bool WayMemory::fits(const Config& config) noexcept {
 
 std::size_t WayMemory::arena_bytes(const Config& config) noexcept {
   const auto count = static_cast<std::size_t>(extent_of(config).blocks);
-  return count * (sizeof(std::int32_t) + sizeof(std::uint64_t) + sizeof(Node)) +
-         config.max_blocks * (sizeof(Block) + sizeof(std::uint32_t) + kRooms * sizeof(Node)) +
-         kWindowBlocks * (sizeof(CellBlock) + sizeof(BlockContent) + sizeof(std::uint64_t)) +
-         kHeap * sizeof(std::uint64_t) + 1024;
+  return count * (sizeof(Position) + sizeof(Node)) + config.max_blocks * (sizeof(Block) + kRooms * sizeof(Node)) +
+         kWindowBlocks * sizeof(Seen) + kHeap * sizeof(std::uint64_t) + 1024;
 }
 
 WayMemory::WayMemory(const Config& config, core::Arena& arena) noexcept
     : config_((ROBORUN_ASSERT(fits(config)), config)),
-      width_(static_cast<int>(std::ceil(2.0 * config.radius_m / kFinestCell_m - 1e-6))) {
+      width_(static_cast<int>(std::ceil(2.0 * config.radius_m / kFinestCell_m - 1e-6))),
+      position_(arena.take<Position>(static_cast<std::size_t>(extent_of(config).blocks), "way positions")),
+      position_pool_(arena.last_pool()),
+      block_(arena.take<Block>(config.max_blocks, "way blocks")),
+      block_pool_(arena.last_pool()),
+      window_(arena.take<Seen>(kWindowBlocks, "way window")),
+      window_pool_(arena.last_pool()),
+      node_(arena.take<Node>(position_.size() + kRooms * config.max_blocks, "way nodes")),
+      node_pool_(arena.last_pool()),
+      heap_(arena.take<std::uint64_t>(kHeap, "way heap")),
+      heap_pool_(arena.last_pool()) {
   const Extent e = extent_of(config);
   corner_ = {e.corner[0], e.corner[1], e.corner[2]};
   size_ = {e.size[0], e.size[1], e.size[2]};
-  const auto positions = static_cast<std::size_t>(e.blocks);
-  kind_ = arena.take<std::int32_t>(positions, "way positions");
-  digest_ = arena.take<std::uint64_t>(positions, "way digests");
-  block_ = arena.take<Block>(config.max_blocks, "way blocks");
-  free_ = arena.take<std::uint32_t>(config.max_blocks, "way free list");
-  window_ = arena.take<CellBlock>(kWindowBlocks, "way window");
-  window_content_ = arena.take<BlockContent>(kWindowBlocks, "way window contents");
-  window_digest_ = arena.take<std::uint64_t>(kWindowBlocks, "way window digests");
-  node_ = arena.take<Node>(positions + kRooms * config.max_blocks, "way nodes");
-  heap_ = arena.take<std::uint64_t>(kHeap, "way heap");
-  std::fill(kind_.begin(), kind_.end(), kOpen);
-  for (std::size_t i = 0; i < free_.size(); ++i) free_[i] = static_cast<std::uint32_t>(free_.size() - 1 - i);
-  free_count_ = free_.size();
+  for (std::size_t i = 0; i < block_.size(); ++i) block_[i].position = static_cast<std::uint32_t>(i + 1);
 }
 
 WayMemory::Cell WayMemory::place_of(const Vector3& p_W) const noexcept {
@@ -104,7 +102,7 @@ Vector3 WayMemory::at_W(const Cell& place) const noexcept {
 unsigned WayMemory::room_at(const Cell& place) const noexcept {
   const Cell block{place.x >> 4, place.y >> 4, place.z >> 4};
   if (!has(block)) return 0;
-  const std::int32_t kind = kind_[position_of(block)];
+  const std::int32_t kind = kind_at(position_of(block));
   if (kind == kOpen) return kFirstOpenRoom;
   if (kind == kKnown) return 1;
   if (kind == kClosed) return 0;
@@ -132,19 +130,28 @@ bool WayMemory::nearest_room(const Vector3& p_W, Cell& place) const noexcept {
 }
 
 std::uint32_t WayMemory::node_of(std::uint32_t position, unsigned room) const noexcept {
-  const std::int32_t kind = kind_[position];
+  const std::int32_t kind = kind_at(position);
   if (kind < 0) return position;
-  return static_cast<std::uint32_t>(kind_.size() + kRooms * static_cast<std::size_t>(kind) + room);
+  return static_cast<std::uint32_t>(position_.size() + kRooms * static_cast<std::size_t>(kind) + room);
 }
 
 WayMemory::Block* WayMemory::take(std::uint32_t position) noexcept {
-  std::int32_t& kind = kind_[position];
+  std::int32_t& kind = position_[position].kind;
   if (kind >= 0) return &block_[static_cast<std::size_t>(kind)];
-  if (free_count_ == 0) return nullptr;
-  kind = static_cast<std::int32_t>(free_[--free_count_]);
-  Block& block = block_[static_cast<std::size_t>(kind)];
+  if (free_ >= block_.size()) return nullptr;
+  kind = static_cast<std::int32_t>(free_);
+  Block& block = block_[free_];
+  free_ = block.position;
   block.position = position;
+  block_pool_.use(++block_count_);
   return &block;
+}
+
+void WayMemory::give_back(std::int32_t block) noexcept {
+  if (block < 0) return;
+  block_[static_cast<std::size_t>(block)].position = free_;
+  free_ = static_cast<std::uint32_t>(block);
+  --block_count_;
 }
 
 bool WayMemory::read_window(const MapView& map, const Cell& low, const Cell& high, core::StageBudget& budget,
@@ -157,13 +164,14 @@ bool WayMemory::read_window(const MapView& map, const Cell& low, const Cell& hig
         const Vector3 corner_W =
             kFinestCell_m *
             Vector3(corner_.x + kBlockCells * x, corner_.y + kBlockCells * y, corner_.z + kBlockCells * z);
-        window_content_[i] = map.read(corner_W, window_[i], work.units);
-        window_digest_[i] = window_content_[i] == BlockContent::kMixed
-                                ? digest_of(window_[i])
-                                : static_cast<std::uint64_t>(window_content_[i]);
+        Seen& seen = window_[i];
+        seen.content = map.read(corner_W, seen.cells, work.units);
+        seen.digest = seen.content == BlockContent::kMixed ? digest_of(seen.cells)
+                                                           : static_cast<std::uint64_t>(seen.content);
       }
     }
   }
+  window_pool_.use(i);
   return true;
 }
 
@@ -174,11 +182,11 @@ std::uint64_t WayMemory::cells_at(const Cell& block, const Cell& low, const Cell
   for (std::int32_t i = 0; i < 8; ++i) {
     const std::int32_t x = block.x - low.x + (i & 1), y = block.y - low.y + ((i >> 1) & 1), z = block.z - low.z + (i >> 2);
     const auto w = static_cast<std::size_t>((z * wide_y + y) * wide_x + x);
-    cells.block[static_cast<std::size_t>(i)] = &window_[w];
-    cells.content[static_cast<std::size_t>(i)] = window_content_[w];
-    digest = core::mix64(digest + window_digest_[w] + 1);
+    cells.block[static_cast<std::size_t>(i)] = &window_[w].cells;
+    cells.content[static_cast<std::size_t>(i)] = window_[w].content;
+    digest = core::mix64(digest + window_[w].digest + 1);
   }
-  return digest;
+  return digest | 1U;
 }
 
 Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, core::StageBudget& budget,
@@ -195,6 +203,7 @@ Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, c
   if (seen_low_.x > seen_high_.x) seen_low_ = low, seen_high_ = high;
   seen_low_ = {std::min(seen_low_.x, low.x), std::min(seen_low_.y, low.y), std::min(seen_low_.z, low.z)};
   seen_high_ = {std::max(seen_high_.x, high.x), std::max(seen_high_.y, high.y), std::max(seen_high_.z, high.z)};
+  wait_at(p_W);
   std::size_t changed = 0;
   bool spent = false;
   for (std::int32_t z = low.z; z <= high.z; ++z) {
@@ -202,11 +211,12 @@ Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, c
       for (std::int32_t x = low.x; x <= high.x; ++x) {
         WayCells cells;
         const std::uint64_t digest = cells_at({x, y, z}, low, high, cells);
-        std::uint64_t& before = digest_[position_of({x, y, z})];
+        std::uint64_t& before = position_[position_of({x, y, z})].digest;
         if (before == digest) continue;
         work.units += kWorkOfABlock;
         spent = spent || changed == changed_.size() || budget.spent(work);
         if (spent) continue;
+        if (before == 0) position_pool_.use(++seen_count_);
         before = digest;
         renew({x, y, z}, cells);
         changed_[changed++] = {x, y, z};
@@ -215,6 +225,19 @@ Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, c
   }
   for (std::size_t i = 0; i < changed; ++i) find_doors(changed_[i]);
   return spent ? Status::kBudgetSpent : Status::kOk;
+}
+
+void WayMemory::wait_at(const Vector3& p_W) noexcept {
+  const bool stands = (p_W - looked_from_W_).norm() < kStands_m;
+  looked_from_W_ = p_W;
+  if (!stands) return;
+  const Cell at = place_of(p_W);
+  for (std::int32_t i = 0; i < 27; ++i) {
+    const Cell block{(at.x >> 4) + i % 3 - 1, (at.y >> 4) + i / 3 % 3 - 1, (at.z >> 4) + i / 9 - 1};
+    if (!has(block)) continue;
+    std::uint32_t& waits = position_[position_of(block)].waits;
+    waits = std::min(waits + 1, kMostWaits);
+  }
 }
 
 void WayMemory::forbid(const Cell& block, WayPlaces& places) const noexcept {
@@ -244,13 +267,13 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
     return std::all_of(rows.begin(), rows.end(), [value](std::uint16_t row) { return row == value; });
   };
   const std::uint32_t position = position_of(block);
-  std::int32_t& kind = kind_[position];
+  std::int32_t& kind = position_[position].kind;
   const std::int32_t uniform = all(places.known, 0xFFFF)  ? kKnown
                                : all(places.open, 0xFFFF) ? kOpen
                                : all(places.known, 0) && all(places.open, 0) ? kClosed
                                                                              : 0;
   if (uniform < 0) {
-    if (kind >= 0) free_[free_count_++] = static_cast<std::uint32_t>(kind);
+    give_back(kind);
     kind = uniform;
     return;
   }
@@ -260,14 +283,14 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
 }
 
 void WayMemory::find_doors(const Cell& block) noexcept {
-  const std::int32_t kind = kind_[position_of(block)];
+  const std::int32_t kind = kind_at(position_of(block));
   if (kind >= 0) find_inner_doors(block_[static_cast<std::size_t>(kind)]);
   for (std::size_t face = 0; face < kFaces; ++face) {
     if (kind >= 0) find_face_doors(block_[static_cast<std::size_t>(kind)], block, face);
     const std::int32_t by = face % 2 == 0 ? 1 : -1;
     const Cell next{block.x + (face / 2 == 0 ? by : 0), block.y + (face / 2 == 1 ? by : 0),
                     block.z + (face / 2 == 2 ? by : 0)};
-    const std::int32_t other = has(next) ? kind_[position_of(next)] : kClosed;
+    const std::int32_t other = has(next) ? kind_at(position_of(next)) : kClosed;
     if (other >= 0) find_face_doors(block_[static_cast<std::size_t>(other)], next, face ^ 1U);
   }
 }

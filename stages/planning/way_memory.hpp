@@ -64,10 +64,21 @@ class WayMemory {
     WayRooms rooms{};
     std::array<std::array<Door, kDoorsPerFace>, kFaces + 1> door{};
     std::array<std::uint8_t, kFaces + 1> doors{};
-    std::uint32_t position{};
+    std::uint32_t position{};  ///< Or, of a block that is not in use, the next such one.
   };
   /// All of one kind, or the index of a Block.
   static constexpr std::int32_t kOpen = -1, kKnown = -2, kClosed = -3;
+  struct Position {
+    std::int32_t kind{kOpen};
+    std::uint32_t waits{};   ///< Looks during which the vehicle stood beside it.
+    std::uint64_t digest{};  ///< Of the cells that its places touch, when it was last looked at; 0: never.
+  };
+  /// A block of the map.
+  struct Seen {
+    CellBlock cells{};
+    BlockContent content{};
+    std::uint64_t digest{};
+  };
   static constexpr std::uint32_t kFar = 0xFFFFFFFFU;
   static constexpr std::uint32_t kNowhere = 0xFFFFFFFFU;
   struct Node {
@@ -106,6 +117,8 @@ class WayMemory {
   void find_face_doors(Block& b, const Cell& block, std::size_t face) noexcept;
   void find_inner_doors(Block& b) noexcept;
   [[nodiscard]] Block* take(std::uint32_t position) noexcept;
+  void give_back(std::int32_t block) noexcept;
+  [[nodiscard]] std::int32_t kind_at(std::uint32_t position) const noexcept { return position_[position].kind; }
 
   [[nodiscard]] bool seed(const Vector3& goal_W) noexcept;
   [[nodiscard]] bool is_settled(std::uint32_t node) const noexcept { return node_[node].settled == search_; }
@@ -116,26 +129,34 @@ class WayMemory {
   void relax(std::uint32_t node) noexcept;
   void relax_uniform(std::uint32_t node, const Cell& block, unsigned room) noexcept;
   void relax_rooms(std::uint32_t node, const Block& b, unsigned room) noexcept;
-  [[nodiscard]] std::uint32_t step_cost(const Cell& from, const Cell& to, unsigned room) const noexcept;
+  /// Of a metre in a room.
+  [[nodiscard]] double price(std::uint32_t position, unsigned room) const noexcept;
+  [[nodiscard]] static std::uint32_t step_cost(const Cell& from, const Cell& to, double price) noexcept;
+  void wait_at(const Vector3& p_W) noexcept;
 
   Config config_;
   int width_;  ///< Of the vehicle, in cells.
   Cell corner_{};  ///< First cell of the first block, in cells from the world's origin.
   Cell size_{};    ///< Blocks.
-  std::span<std::int32_t> kind_;
-  std::span<std::uint64_t> digest_;  ///< Of the cells that a position's places touch, when it was last looked at.
+  std::span<Position> position_;
+  core::PoolRecord& position_pool_;
+  std::size_t seen_count_{};
   std::span<Block> block_;
-  std::span<std::uint32_t> free_;
-  std::size_t free_count_{};
+  core::PoolRecord& block_pool_;
+  std::uint32_t free_{};  ///< First of the blocks that are not in use.
+  std::size_t block_count_{};
   std::array<Cell, 512> changed_{};  ///< In this look.
-  std::span<CellBlock> window_;
-  std::span<BlockContent> window_content_;
-  std::span<std::uint64_t> window_digest_;
+  std::span<Seen> window_;
+  core::PoolRecord& window_pool_;
   std::span<Node> node_;  ///< Those of positions, then kRooms of each block.
+  core::PoolRecord& node_pool_;
+  std::size_t reached_count_{};
   std::uint32_t search_{0};
   std::span<std::uint64_t> heap_;
+  core::PoolRecord& heap_pool_;
   std::size_t heap_count_{};
   bool overflown_{};
+  Vector3 looked_from_W_ = Vector3::Constant(1e9);
   Cell seen_low_{0, 0, 0}, seen_high_{-1, -1, -1};  ///< Of all blocks looked at.
   Cell low_{}, high_{};                             ///< What the search runs in.
 };

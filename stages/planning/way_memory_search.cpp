@@ -12,15 +12,20 @@ namespace {
 constexpr double kUnit_m = 0.01;  // of costs
 constexpr double kMost_m = 1e5;
 constexpr std::uint32_t kPollEvery = 256;
+constexpr double kWaits = 16.0;  // after so many what is unknown costs twice as much
 constexpr std::uint32_t kBeyond = 3000;  // units of cost that the search runs on beyond the vehicle
 constexpr std::array<std::array<std::int32_t, 3>, 6> kStep{
     {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
 
 }  // namespace
 
-std::uint32_t WayMemory::step_cost(const Cell& from, const Cell& to, unsigned room) const noexcept {
+double WayMemory::price(std::uint32_t position, unsigned room) const noexcept {
+  return is_known_room(room) ? 1.0 : kUnknownWeight * (1.0 + position_[position].waits / kWaits);
+}
+
+std::uint32_t WayMemory::step_cost(const Cell& from, const Cell& to, double price) noexcept {
   const double length_m = kFinestCell_m * Vector3(from.x - to.x, from.y - to.y, from.z - to.z).norm();
-  return static_cast<std::uint32_t>(length_m / kUnit_m * (is_known_room(room) ? 1.0 : kUnknownWeight) + 0.5);
+  return static_cast<std::uint32_t>(length_m / kUnit_m * price + 0.5);
 }
 
 void WayMemory::reach(std::uint32_t node, std::uint32_t cost, std::uint32_t next, const Cell& entry) noexcept {
@@ -30,18 +35,21 @@ void WayMemory::reach(std::uint32_t node, std::uint32_t cost, std::uint32_t next
     overflown_ = true;
     return;
   }
+  if (n.reached != search_) node_pool_.use(++reached_count_);
   n = {cost, next, entry, search_, n.settled};
+  heap_pool_.use(heap_count_ + 1);
   heap_[heap_count_++] = (std::uint64_t{cost} << 32U) | node;
   std::push_heap(heap_.begin(), heap_.begin() + static_cast<std::ptrdiff_t>(heap_count_), std::greater<>());
 }
 
 void WayMemory::relax_uniform(std::uint32_t node, const Cell& block, unsigned room) noexcept {
   const Node& n = node_[node];
+  const double metre = price(node, room);
   for (std::size_t face = 0; face < kFaces; ++face) {
     const Cell next{block.x + kStep[face][0], block.y + kStep[face][1], block.z + kStep[face][2]};
     if (!in_search(next)) continue;
     const std::uint32_t position = position_of(next);
-    const std::int32_t kind = kind_[position];
+    const std::int32_t kind = kind_at(position);
     const Cell corner{kBlockCells * next.x, kBlockCells * next.y, kBlockCells * next.z};
     if (kind == kClosed) continue;
     if (kind < 0) {
@@ -50,7 +58,7 @@ void WayMemory::relax_uniform(std::uint32_t node, const Cell& block, unsigned ro
         return c + (face / 2 != axis ? 8 : face % 2 == 0 ? 0 : 15);
       };
       const Cell door{middle(0, corner.x), middle(1, corner.y), middle(2, corner.z)};
-      reach(position, n.cost + step_cost(n.entry, door, room), node, door);
+      reach(position, n.cost + step_cost(n.entry, door, metre), node, door);
       continue;
     }
     const Block& b = block_[static_cast<std::size_t>(kind)];
@@ -58,13 +66,14 @@ void WayMemory::relax_uniform(std::uint32_t node, const Cell& block, unsigned ro
     for (std::size_t i = 0; i < b.doors[back]; ++i) {
       const Door& d = b.door[back][i];
       const Cell door{corner.x + d.x, corner.y + d.y, corner.z + d.z};
-      reach(node_of(position, d.room), n.cost + step_cost(n.entry, door, room), node, door);
+      reach(node_of(position, d.room), n.cost + step_cost(n.entry, door, metre), node, door);
     }
   }
 }
 
 void WayMemory::relax_rooms(std::uint32_t node, const Block& b, unsigned room) noexcept {
   const Node& n = node_[node];
+  const double metre = price(b.position, room);
   const Cell block = block_at(b.position);
   const Cell corner{kBlockCells * block.x, kBlockCells * block.y, kBlockCells * block.z};
   for (std::size_t face = 0; face < kFaces; ++face) {
@@ -75,7 +84,7 @@ void WayMemory::relax_rooms(std::uint32_t node, const Block& b, unsigned room) n
       const Door& d = b.door[face][i];
       if (d.room != room) continue;
       const Cell door{corner.x + d.x + by[0], corner.y + d.y + by[1], corner.z + d.z + by[2]};
-      reach(node_of(position_of(next), d.other), n.cost + step_cost(n.entry, door, room), node, door);
+      reach(node_of(position_of(next), d.other), n.cost + step_cost(n.entry, door, metre), node, door);
     }
   }
   for (std::size_t i = 0; i < b.doors[kInside]; ++i) {
@@ -83,14 +92,14 @@ void WayMemory::relax_rooms(std::uint32_t node, const Block& b, unsigned room) n
     if (d.room != room && d.other != room) continue;
     const Cell door{corner.x + d.x, corner.y + d.y, corner.z + d.z};
     const unsigned other = d.room == room ? d.other : d.room;
-    reach(node_of(b.position, other), n.cost + step_cost(n.entry, door, room), node, door);
+    reach(node_of(b.position, other), n.cost + step_cost(n.entry, door, metre), node, door);
   }
 }
 
 void WayMemory::relax(std::uint32_t node) noexcept {
-  if (node < kind_.size())
-    return relax_uniform(node, block_at(node), kind_[node] == kKnown ? 1U : kFirstOpenRoom);
-  const std::size_t index = node - kind_.size();
+  if (node < position_.size())
+    return relax_uniform(node, block_at(node), kind_at(node) == kKnown ? 1U : kFirstOpenRoom);
+  const std::size_t index = node - position_.size();
   relax_rooms(node, block_[index / kRooms], static_cast<unsigned>(index % kRooms));
 }
 
@@ -117,7 +126,7 @@ bool WayMemory::seed(const Vector3& goal_W) noexcept {
           continue;
         }
         const std::uint32_t position = position_of({x, y, z});
-        if (kind_[position] != kOpen) continue;
+        if (kind_at(position) != kOpen) continue;
         const Cell middle{kBlockCells * x + 8, kBlockCells * y + 8, kBlockCells * z + 8};
         const double rest_m = kUnknownWeight * (goal_W - at_W(middle)).norm();
         reach(position, static_cast<std::uint32_t>(std::fmin(rest_m / kUnit_m, 4e8)), kNowhere, middle);
@@ -136,6 +145,7 @@ Status WayMemory::solve(const Vector3& from_W, const Vector3& goal_W, core::Stag
            std::min(seen_high_.z + 1, size_.z - 1)};
   ++search_;
   heap_count_ = 0;
+  reached_count_ = 0;
   overflown_ = false;
   Cell start{};
   if (!nearest_room(from_W, start)) return Status::kStartBlocked;
@@ -164,9 +174,10 @@ double WayMemory::to_goal_m(const Vector3& p_W) const noexcept {
   Cell place{};
   if (!nearest_room(p_W, place)) return kInfinity;
   const unsigned room = room_at(place);
-  const Node& n = node_[node_of(position_of({place.x >> 4, place.y >> 4, place.z >> 4}), room)];
+  const std::uint32_t position = position_of({place.x >> 4, place.y >> 4, place.z >> 4});
+  const Node& n = node_[node_of(position, room)];
   if (n.settled != search_) return kInfinity;
-  return kUnit_m * n.cost + (at_W(n.entry) - p_W).norm() * (is_known_room(room) ? 1.0 : kUnknownWeight);
+  return kUnit_m * n.cost + (at_W(n.entry) - p_W).norm() * price(position, room);
 }
 
 std::size_t WayMemory::known_way(const Vector3& from_W, double within_m, std::span<Vector3> way_W) const noexcept {
@@ -176,8 +187,8 @@ std::size_t WayMemory::known_way(const Vector3& from_W, double within_m, std::sp
   std::uint32_t node = node_of(position_of({place.x >> 4, place.y >> 4, place.z >> 4}), room);
   std::size_t count = 0;
   while (count < way_W.size() && is_settled(node)) {
-    const bool known = node < kind_.size() ? kind_[node] == kKnown
-                                           : is_known_room(static_cast<unsigned>((node - kind_.size()) % kRooms));
+    const bool known = node < position_.size() ? kind_at(node) == kKnown
+                                           : is_known_room(static_cast<unsigned>((node - position_.size()) % kRooms));
     if (!known) break;
     const Vector3 at = at_W(node_[node].entry);
     if ((at - from_W).norm() > within_m) break;

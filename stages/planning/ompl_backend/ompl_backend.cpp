@@ -65,8 +65,8 @@ class OmplPlanner final : public Planner {
     std::uint32_t checks = 0;
     bool spent = false;
     const ob::PlannerTerminationCondition stop([&] {
-      work.volume_m3 = std::min(request.volume_m3, 0.1 * kExplored_m3 * checks);
-      spent = budget.spent(work);
+      work.volume_m3 = 0.1 * kExplored_m3 * checks;
+      spent = work.volume_m3 >= request.volume_m3 || budget.spent(work);
       return spent || ++checks > config_.max_iterations ||
              (problem->hasExactSolution() && checks > config_.max_iterations / 4);
     });
