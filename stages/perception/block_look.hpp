@@ -238,12 +238,16 @@ HWY_INLINE void aim(const SightCamera& c, float half_m, const Lanes& at, Look& l
     const auto half_over_near = hn::Div(half, nearest);
     const auto u = hn::Mul(y, inverse);
     const auto v = hn::Mul(z, inverse);
-    const auto wider = hn::Add(set(c.widening), hn::Mul(set(c.widening_m), inverse));
-    const auto columns =
-        store_pixels(u, hn::Add(half_width(c, 1, u, half_over_near), wider), c.tan_half_width,
-                     c.columns_per_tan, c.last_column, pixels.u0 + i, pixels.u1 + i);
-    const auto rows = store_pixels(v, hn::Add(half_width(c, 2, v, half_over_near), wider), c.tan_half_height,
-                                   c.rows_per_tan, c.last_row, pixels.v0 + i, pixels.v1 + i);
+    auto half_u = half_width(c, 1, u, half_over_near), half_v = half_width(c, 2, v, half_over_near);
+    if (c.widening > 0.0F || c.widening_m > 0.0F) {
+      const auto wider = hn::Add(set(c.widening), hn::Mul(set(c.widening_m), inverse));
+      half_u = hn::Add(half_u, wider);
+      half_v = hn::Add(half_v, wider);
+    }
+    const auto columns = store_pixels(u, half_u, c.tan_half_width, c.columns_per_tan, c.last_column,
+                                      pixels.u0 + i, pixels.u1 + i);
+    const auto rows =
+        store_pixels(v, half_v, c.tan_half_height, c.rows_per_tan, c.last_row, pixels.v0 + i, pixels.v1 + i);
     longest = hn::Max(longest, hn::Max(columns, rows));
     // What the camera calls empty up to its range is believed up to the range itself: no margin there.
     const auto margin = hn::Add(set(c.margin_m), hn::Mul(set(c.margin_quadratic_per_m), hn::Mul(far, far)));

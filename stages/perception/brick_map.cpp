@@ -195,7 +195,7 @@ void BrickMap::assume_free(const Vector3& half_m) noexcept {
         Brick* brick = touch(bx, by, bz);
         if (brick == nullptr) continue;
         const std::uint32_t morton = morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z));
-        if (brick->cell(morton) != evidence::kUnknown) continue;
+        if (evidence::is_occupied(brick->cell(morton))) continue;
         brick->add_free(0, morton / 8, static_cast<std::uint8_t>(1U << (morton % 8)));
       }
     }

@@ -78,6 +78,9 @@ class BrickMap final : public OccupancyMap, private MapView {
   struct Cell {
     std::int32_t x, y, z;
   };
+  static constexpr double kOrderStep_m =
+      0.5;  ///< Units whose distances differ by less keep their order in space.
+  static constexpr int kBlockLevel = kBrickLevel + 1;
   static constexpr std::int32_t kUnknownBrick = -1;
   /// Nothing known but that a look at p0 >= 4.8 m met a surface there: occupied as a brick, unknown below.
   static constexpr std::int32_t kSurfaceBrick = -2;
@@ -154,6 +157,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   /// Of column u and row v of the image, in edges, for a depth of 1.
   [[nodiscard]] static std::array<float, 3> direction(const SurfaceCamera& camera, double u, double v,
                                                       double edge_m) noexcept;
+  [[nodiscard]] static bool moved_nearby(std::span<const Vector3> moved_W, const Vector3& p_W) noexcept;
   void add_surfaces(const IntegrationRequest& request, core::Work& work) noexcept;
   /// The pixels [u0, u1) of row v.
   void add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
