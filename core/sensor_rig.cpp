@@ -5,7 +5,7 @@
 namespace roborun {
 namespace {
 
-using rig_detail::kDegree;
+using core::kDegree;
 
 /// Exact at multiples of 90 degrees, and without negative zeros.
 double sin_deg(double deg) noexcept {

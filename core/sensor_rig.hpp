@@ -81,14 +81,13 @@ struct SensorKey {
 
 namespace rig_detail {
 
-inline constexpr double kDegree = core::kPi / 180.0;
 inline double tan_of_half_deg(double whole_deg) noexcept {
-  const double half = 0.5 * whole_deg * kDegree;
+  const double half = 0.5 * whole_deg * core::kDegree;
   // Half of a right angle is exact: six such cameras touch each other.
   return whole_deg == 90.0 ? 1.0 : core::sin(half) / core::cos(half);
 }
 inline double whole_deg_of(double tan_half) noexcept {
-  return tan_half == 1.0 ? 90.0 : 2.0 * core::atan2(tan_half, 1.0) / kDegree;
+  return tan_half == 1.0 ? 90.0 : 2.0 * core::atan2(tan_half, 1.0) / core::kDegree;
 }
 
 /// A key for a member that stands in the file as it is.

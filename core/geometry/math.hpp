@@ -8,6 +8,7 @@
 namespace roborun::core {
 
 inline constexpr double kPi = 3.14159265358979323846;
+inline constexpr double kDegree = kPi / 180.0;  ///< Radians.
 inline constexpr double kGravity_mps2 = 9.81;
 
 struct SinCos {

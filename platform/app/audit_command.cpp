@@ -20,6 +20,7 @@
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/output_file.hpp"
+#include "platform/input/stop_signal.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/audit_run.hpp"
 #include "platform/mission/settings_file.hpp"
@@ -155,8 +156,7 @@ std::string digest_of_file(const std::string& path) { return "sha256 " + report:
 /// What was asked for, in front of what the run says of itself.
 void identify(const AuditOptions& options, const sitl::NamedEnvironment& environment,
               const vehicle::Vehicle& vehicle, report::AuditReport& result) {
-  const std::vector<std::string> shipped = vehicle::shipped_vehicles();
-  const bool is_shipped = std::find(shipped.begin(), shipped.end(), options.vehicle) != shipped.end();
+  const bool is_shipped = vehicle::ships(options.vehicle);
   const bool in_program = options.profile == "paper" || options.profile == "cortex-a72";
   const std::string profile = options.profile == "host" ? board::default_host_path({}) : options.profile;
   std::vector<std::pair<std::string, std::string>> asked{
@@ -252,6 +252,8 @@ int audit(const AuditOptions& options) {
                    gpio::LineConfig{options.kill_lines[1], options.active_low, bias}};
   }
   const bool terminal = isatty(STDERR_FILENO) != 0;
+  const input::StopOnSignal stop;
+  config.stop = &input::StopOnSignal::requested;
   report::AuditReport result = mission::run_real_time(world, config, [&](double done_s) {
     if (terminal) fmt::print(stderr, "\raudit {:3.0f} of {:.0f} s   ", done_s, options.seconds);
   });
@@ -270,6 +272,9 @@ int audit(const AuditOptions& options) {
   else
     fmt::print("{}", report::audit_table(result));
   write_files(options, result);
+  if (result.interrupted)
+    throw input::Interrupted(fmt::format("audit after {:.0f} of {:.0f} s; the report is of that time",
+                                         result.seconds, options.seconds));
   return report::passes(result) ? kDone : kNotGood;
 }
 
@@ -290,8 +295,8 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
       "\nWhat cannot be shown (a percentile of too few frames, a run without what real time needs) is a "
       "FAIL.\n"
       "Exit code: 0 PASS (with --compare: no regression), 1 FAIL (a regression), 2 bad input, or no real "
-      "time to be "
-      "had here.");
+      "time to be had here,\n130 Ctrl-C, SIGTERM or a closed terminal: the report is of the time until "
+      "then.");
   add_number(*command, "--seconds", options->seconds, 1.0, 86400.0, "How long, 1 .. 86400");
   command
       ->add_option("--rate", options->rate_Hz, "Of the flight lane, Hz: 100, 125, 160, 200, 250, 320 or 400")

@@ -24,6 +24,7 @@
 #include "platform/mission/mission.hpp"
 #include "platform/mission/settings_file.hpp"
 #include "platform/mission/work_check.hpp"
+#include "platform/report/known_picture.hpp"
 #include "platform/report/progress_line.hpp"
 #include "platform/report/svg_plot.hpp"
 #include "platform/report/table.hpp"
@@ -98,8 +99,9 @@ int fly(const FlyOptions& options) {
   const auto colour =
       std::find(report::kPathColourName.begin(), report::kPathColourName.end(), options.colour);
   const bool maps = options.colour == "all";
-  if (colour == report::kPathColourName.end() && !maps)
-    throw InputError(fmt::format("--color: unknown colour '{}': must be {} or all", options.colour,
+  const bool known = options.colour == "known";
+  if (colour == report::kPathColourName.end() && !maps && !known)
+    throw InputError(fmt::format("--color: unknown colour '{}': must be {}, all or known", options.colour,
                                  fmt::join(report::kPathColourName, ", ")));
   if (!options.record.empty() && designs.size() != 1)
     throw InputError("--record: one flight a file: must go with one --design");
@@ -152,12 +154,13 @@ int fly(const FlyOptions& options) {
           options.profile);
   }
   config.seed = seed;
+  config.keep_known = known;
   config.record = options.record;
   config.backends.map = options.map;
   config.backends.planner = options.planner;
   std::vector<report::MissionReport> reports;
   bool all_reached = true;
-  bool believed = true;
+  bool all_believed = true;
   const input::StopOnSignal stop;
   for (const governor::Design design : designs) {
     config.flight.design = design;
@@ -180,7 +183,8 @@ int fly(const FlyOptions& options) {
     result.env = env;
     result.mission = options.world.empty() ? options.mission : "world_file";
     all_reached = all_reached && result.reached_goal && !result.collided;
-    believed = believes(options, reports.back()) && believed;
+    result.believed = believes(options, reports.back());
+    all_believed = all_believed && result.believed;
   }
 
   if (options.json) {
@@ -197,13 +201,14 @@ int fly(const FlyOptions& options) {
   if (!options.plot.empty()) {
     const report::Scene scene = evaluation::scene_of(*world, title, zone_m);
     const auto by = static_cast<report::PathColour>(colour - report::kPathColourName.begin());
-    input::write_file(options.plot,
-                      maps ? report::maps_svg(scene, reports) : report::mission_svg(scene, reports, by));
+    input::write_file(options.plot, known  ? report::known_svg(scene, reports)
+                                    : maps ? report::maps_svg(scene, reports)
+                                           : report::mission_svg(scene, reports, by));
   }
   if (!options.json && !options.plot.empty()) fmt::print("picture: {}\n", options.plot);
   if (!options.json && !options.trace.empty()) fmt::print("trace: {}\n", options.trace);
   if (!options.json && !options.record.empty()) fmt::print("recording: {}\n", options.record);
-  return all_reached && believed ? kDone : kNotGood;
+  return all_reached && all_believed ? kDone : kNotGood;
 }
 
 }  // namespace
@@ -274,7 +279,7 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
           ->add_option(
               "--color", options->colour,
               "What colours the paths of --plot: speed, precision, volume, latency, visibility, deadline; "
-              "all: a map of each")
+              "all: a map of each; known: speed, over what the map knew at the end")
           ->capture_default_str();
   fly_app->add_flag("--json", options->json, "One JSON object a design on standard output, nothing else");
   fly_app->callback([=, &run] {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "platform/app/options.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
 
@@ -48,7 +49,7 @@ void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
   command.add_option("--cell", arguments.cell,
                      fmt::format("Of point clouds: each cell of this size with a point is solid, metres [{}]",
                                  sitl::kCloudCell_m));
-  command.add_option("--scale", arguments.scale, "Metres in a unit of the file")->capture_default_str();
+  add_number(command, "--scale", arguments.scale, 1e-6, 1e6, "Metres in a unit of the file, 1e-6 .. 1e6");
   command.add_flag("--surfaces", arguments.surfaces,
                    "Take meshes that are not closed, as surfaces without an inside");
 }

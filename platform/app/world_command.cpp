@@ -44,8 +44,6 @@ struct MakeOptions {
 nlohmann::ordered_json point_json(const Vector3& p) { return {p.x(), p.y(), p.z()}; }
 
 int check(const CheckOptions& options) {
-  if (!(options.margin_m >= 0.0 && options.margin_m <= 2.0))
-    throw InputError(fmt::format("--margin: {} must be from 0 to 2 m", options.margin_m));
   const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.vehicle);
   input::check_outputs({{"--plot", options.plot}}, {options.world, options.vehicle});
   const double body_m = vehicle.model.radius_m;
@@ -153,8 +151,8 @@ void add_check(CLI::App& world, std::function<int()>& run) {
       ->add_option("--vehicle", options->vehicle,
                    "a shipped vehicle (roborun vehicle list), or a vehicle file")
       ->capture_default_str();
-  command->add_option("--margin", options->margin_m, "free space around the vehicle, metres")
-      ->capture_default_str();
+  add_number(*command, "--margin", options->margin_m, 0.0, 2.0,
+             "free space around the vehicle, metres, 0 .. 2");
   command->add_option("--resolution", options->resolution_m,
                       "of what is looked at, metres [0.2, or a third of the radius]");
   command->add_option("--plot", options->plot, "write a picture to this SVG file");

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/record/state_hash.hpp"
+#include "platform/evaluation/suite.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/json_reader.hpp"
 
@@ -25,6 +26,7 @@ Json json_of(const SweepPlan& p) {
   json["map"] = p.map;
   json["planner"] = p.planner;
   json["vehicle"] = p.vehicle;
+  json["worlds"] = p.worlds;
   json["settings"] = p.settings;
   json["shard"] = fmt::format("{}/{}", p.shard, p.shards);
   return json;
@@ -36,7 +38,7 @@ std::vector<SweepMission> missions_of(const SweepPlan& plan) {
   std::vector<SweepMission> missions;
   const auto shards = static_cast<std::size_t>(plan.shards);
   std::size_t k = 0;
-  for (const int environment : plan.environments) {
+  for (const std::string& environment : plan.environments) {
     for (const SweepPlan::ProfileId& profile : plan.profiles) {
       for (const std::string& design : plan.designs) {
         for (const std::uint64_t seed : plan.seeds) {
@@ -52,9 +54,10 @@ std::vector<SweepMission> missions_of(const SweepPlan& plan) {
 }
 
 bool is_representative(const SweepPlan& plan, const SweepMission& mission) {
-  constexpr int kMiddle = 14;
-  int environment = plan.environments[plan.environments.size() / 2];
-  for (const int e : plan.environments) environment = e == kMiddle ? e : environment;
+  if (is_suite(plan.suite)) return false;
+  constexpr const char* kMiddle = "14";
+  std::string environment = plan.environments[plan.environments.size() / 2];
+  for (const std::string& e : plan.environments) environment = e == kMiddle ? e : environment;
   return mission.environment == environment && mission.profile == plan.profiles.front().name;
 }
 
@@ -63,7 +66,7 @@ std::string name_of(const SweepMission& m) {
 }
 
 SweepMission mission_of_result(const report::MissionResult& r) {
-  return {std::atoi(r.env.c_str()), r.profile, r.design, r.seed};
+  return {r.env, r.profile, r.design, r.seed};
 }
 
 std::string to_json(const SweepPlan& plan) {
@@ -78,13 +81,15 @@ SweepPlan plan_from_json(const std::string& path, const std::string& text) {
     p.build = json.at("build");
     p.suite = json.at("suite");
     p.mission = json.at("mission");
-    p.environments = json.at("environments").get<std::vector<int>>();
+    for (const Json& e : json.at("environments"))
+      p.environments.push_back(e.is_number() ? std::to_string(e.get<int>()) : e.get<std::string>());
     for (const Json& id : json.at("profiles")) p.profiles.push_back({id.at("name"), id.at("digest")});
     p.designs = json.at("designs").get<std::vector<std::string>>();
     p.seeds = json.at("seeds").get<std::vector<std::uint64_t>>();
     p.map = json.at("map");
     p.planner = json.at("planner");
     p.vehicle = json.value("vehicle", "");
+    p.worlds = json.value("worlds", "");
     p.settings = json.at("settings");
     const std::string shard = json.at("shard");
     const bool whole = std::sscanf(shard.c_str(), "%d/%d", &p.shard, &p.shards) == 2 && p.shard >= 1 &&

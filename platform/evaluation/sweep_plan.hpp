@@ -1,5 +1,5 @@
 /// What a sweep flies: environments x profiles x designs x seeds, and everything else that its results depend
-/// on. Two sweeps of equal plans have equal results, bit for bit.
+/// on. An environment of a suite of worlds (suite.hpp) is "WORLD/VEHICLE", one of the paper's 27 its number. Two sweeps of equal plans have equal results, bit for bit.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace roborun::evaluation {
 
 /// One line of the results.
 struct SweepMission {
-  int environment{};
+  std::string environment;
   std::string profile;
   std::string design;
   std::uint64_t seed{};
@@ -27,13 +27,14 @@ struct SweepPlan {
   std::string build;   ///< Digest of the program that flies.
   std::string suite{"paper27"};
   std::string mission{"package_delivery"};
-  std::vector<int> environments;  ///< Ascending.
+  std::vector<std::string> environments;
   std::vector<ProfileId> profiles;
   std::vector<std::string> designs;
   std::vector<std::uint64_t> seeds;
   std::string map{"own"};
   std::string planner{"own"};
-  std::string vehicle;   ///< Name and digest; empty in plans of before there were others.
+  std::string vehicle;   ///< Names and digests; empty in plans of before there were others.
+  std::string worlds;    ///< Digest of the files of a suite, or empty.
   std::string settings;  ///< Digest of the settings file, or empty.
   int shard{1};          ///< 1 .. shards.
   int shards{1};

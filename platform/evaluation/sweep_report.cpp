@@ -8,6 +8,7 @@
 #include "platform/input/text_file.hpp"
 #include "platform/report/evaluation_table.hpp"
 #include "platform/report/flight_record.hpp"
+#include "platform/report/suite_summary.hpp"
 #include "platform/report/svg.hpp"
 #include "platform/report/sweep_plot.hpp"
 #include "platform/report/trace_csv.hpp"
@@ -80,6 +81,18 @@ class Page {
 };
 
 }  // namespace
+
+void write_suite_report(const SweepStore& store, const std::vector<report::MissionResult>& flights) {
+  const SweepPlan& plan = store.plan();
+  Page page(store, fmt::format("roborun sweep, suite {}: seeds {}", plan.suite, fmt::join(plan.seeds, ", ")));
+  page.text("Flights",
+            fmt::format(
+                "{}\nvehicles {}; map {}, planner {}, settings {}; {} of {} flights\ncommit {}, program {}\n",
+                report::suite_table(flights), plan.vehicle, plan.map, plan.planner,
+                plan.settings.empty() ? "default" : plan.settings, flights.size(), store.missions().size(),
+                plan.commit, plan.build));
+  page.finish();
+}
 
 void write_sweep_report(const SweepStore& store) {
   const SweepPlan& plan = store.plan();

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
+#include "platform/evaluation/suite.hpp"
 #include "platform/evaluation/worker_processes.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
@@ -14,6 +16,7 @@
 #include "platform/report/flight_record.hpp"
 #include "platform/report/progress_line.hpp"
 #include "platform/report/result_line.hpp"
+#include "platform/report/suite_summary.hpp"
 #include "platform/sitl/world/generator.hpp"
 
 namespace roborun::evaluation {
@@ -21,7 +24,8 @@ namespace {
 
 mission::MissionConfig config_of(const SweepPlan& plan, const SweepInputs& inputs,
                                  const SweepMission& mission) {
-  mission::MissionConfig config = inputs.base;
+  mission::MissionConfig config =
+      inputs.base.at(is_suite(plan.suite) ? vehicle_of_environment(mission.environment) : std::string{});
   const board::Profile& profile = inputs.profile.at(mission.profile);
   config.profile_name = mission.profile;
   config.flight.costs = profile.costs;
@@ -34,15 +38,50 @@ mission::MissionConfig config_of(const SweepPlan& plan, const SweepInputs& input
 }
 
 sitl::World world_of(const SweepPlan& plan, const SweepMission& mission) {
-  return sitl::generate(sitl::environment(std::to_string(mission.environment)).knobs,
-                        sitl::mission_of(plan.mission), mission.seed);
+  return sitl::generate(sitl::environment(mission.environment).knobs, sitl::mission_of(plan.mission),
+                        mission.seed);
+}
+
+std::string repeat_command(const SweepPlan& plan, const SuiteProblem& problem, const SweepMission& mission) {
+  std::string command = problem.make + (problem.make.empty() ? "" : " && ");
+  command +=
+      fmt::format("roborun fly {} --vehicle {} --seed {} --design {} --profile {}", problem.fly,
+                  vehicle_of_environment(mission.environment), mission.seed, mission.design, mission.profile);
+  if (plan.map != "own") command += " --map " + plan.map;
+  if (plan.planner != "own") command += " --planner " + plan.planner;
+  if (!plan.settings.empty()) command += " --settings FILE";
+  return command;
+}
+
+/// Where the vehicle has no room at the start or goal the flight is refused: that is its reason.
+report::MissionReport fly_in_suite(const SweepPlan& plan, const SweepInputs& inputs,
+                                   const SweepMission& mission) {
+  const mission::MissionConfig config = config_of(plan, inputs, mission);
+  const double radius_m = config.flight.vehicle.radius_m;
+  const SuiteProblem problem =
+      suite_problem(plan.suite, inputs.worlds, mission.environment, mission.seed, radius_m);
+  report::MissionReport flown;
+  const sitl::World world = problem.world();
+  const double shortest_m = judged_way_m(world, radius_m);
+  try {
+    flown = mission::fly_mission(world, config, {});
+  } catch (const InputError& error) {
+    flown.result.design = mission.design;
+    flown.result.profile = mission.profile;
+    flown.result.seed = mission.seed;
+    flown.result.reason = error.what();
+  }
+  flown.result.suite = {std::isfinite(shortest_m), shortest_m, repeat_command(plan, problem, mission)};
+  return flown;
 }
 
 /// The line and, after a line end, the flight if it is drawn.
 std::string fly_one(const SweepPlan& plan, const SweepInputs& inputs, const SweepMission& mission) {
   report::MissionReport flown =
-      mission::fly_mission(world_of(plan, mission), config_of(plan, inputs, mission), {});
-  flown.result.env = std::to_string(mission.environment);
+      is_suite(plan.suite)
+          ? fly_in_suite(plan, inputs, mission)
+          : mission::fly_mission(world_of(plan, mission), config_of(plan, inputs, mission), {});
+  flown.result.env = mission.environment;
   flown.result.mission = plan.mission;
   return report::to_line(flown.result) + '\n' +
          (is_representative(plan, mission) ? report::to_flight_record(flown) : std::string{});
@@ -109,8 +148,10 @@ void try_sweep(const SweepPlan& plan, const SweepInputs& inputs) {
   const std::array<std::size_t, 1> first{0};
   const auto build = [&](std::size_t) -> std::string {
     const SweepMission& mission = missions.front();
-    const sitl::World world = world_of(plan, mission);
     const mission::MissionConfig config = config_of(plan, inputs, mission);
+    // Whose vehicle, map and planner are tried, in a world that has room for all.
+    const sitl::World world =
+        is_suite(plan.suite) ? sitl::generate(sitl::environment("14").knobs, {}, 1) : world_of(plan, mission);
     const mission::FlightSetup setup(flight_config_of(world, config), config.backends, image_limits(config));
     return "ok";
   };
@@ -148,7 +189,7 @@ bool fly_sweep(SweepStore& store, const SweepInputs& inputs, int jobs) {
     forecast.ended(i, line.elapsed_s());
     std::erase(left, i);
     const auto result = report::from_line(answer.substr(0, end));
-    failed += result && result->reached_goal && !result->collided ? 0 : 1;
+    failed += result && (result->suite ? !report::failed(*result) : report::counts(*result)) ? 0 : 1;
   };
   calls.died = [&](std::size_t i) {
     fmt::print(stderr, "roborun: {}: its process died; not recorded\n", name_of(missions[i]));
@@ -160,7 +201,7 @@ bool fly_sweep(SweepStore& store, const SweepInputs& inputs, int jobs) {
     start();
     if (line.due()) {
       const std::size_t done = missions.size() - left.size();
-      line.show(fmt::format("[{}] {} of {} missions, {} not reached, {} flown, {} left",
+      line.show(fmt::format("[{}] {} of {} missions, {} failed, {} flown, {} left",
                             bar(done, missions.size()), done, missions.size(), failed,
                             clock_of(line.elapsed_s()), clock_of(forecast.left_s(left, line.elapsed_s()))));
     }

@@ -15,7 +15,9 @@ namespace roborun::evaluation {
 /// What the digests of a plan stand for.
 struct SweepInputs {
   std::map<std::string, board::Profile> profile;  ///< By the plan's names.
-  mission::MissionConfig base{};                  ///< With the settings in it.
+  /// By the vehicle's name (without one: of the paper's environments), with the settings in it.
+  std::map<std::string, mission::MissionConfig> base;
+  std::string worlds;              ///< Folder of the suite `foreign`.
   std::vector<std::string> files;  ///< All that was read for them; not in the folder of the sweep.
 };
 
@@ -33,5 +35,7 @@ void try_sweep(const SweepPlan& plan, const SweepInputs& inputs);
 /// Writes the pictures, report.html and tables.txt into the store's folder: the same lines give the same
 /// bytes. Throws InputError if a file cannot be written.
 void write_sweep_report(const SweepStore& store);
+/// The same of a suite of worlds, whose results may have other commands than those of the store.
+void write_suite_report(const SweepStore& store, const std::vector<report::MissionResult>& flights);
 
 }  // namespace roborun::evaluation

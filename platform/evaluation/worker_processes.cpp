@@ -55,7 +55,8 @@ class Children {
                              const std::function<std::string(std::size_t)>& work) {
   (void)prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(1);
-  (void)std::signal(SIGINT, SIG_IGN);   // the parent ends its children ...
+  (void)std::signal(SIGINT, SIG_IGN);  // the parent ends its children ...
+  (void)std::signal(SIGHUP, SIG_IGN);
   (void)std::signal(SIGTERM, SIG_DFL);  // ... and its own handlers are not theirs
   std::string text;
   try {

@@ -225,16 +225,18 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
                                           config_.vehicle.radius_m, draft_.planner_work.units);
   draft_.planner_work.level = out.decision.point.p1_level;
   draft_.planner_budget.emplace(budget_of(core::StageId::kPlanner, out));
-  remember(in);
+  remember(in, out);
   search(in, kCornerRoom_m, out);
 }
 
-void DecisionPipeline::remember(const DecisionInput& in) noexcept {
+void DecisionPipeline::remember(const DecisionInput& in, DecisionOutput& out) noexcept {
   ways_known_ = false;
   if (ways_ == nullptr) return;
   core::Work work;
-  if (ways_->look(map_.view(), in.p_WB, config_.horizon_m + 1.0, *draft_.planner_budget, work) != Status::kOk) return;
-  ways_known_ = ways_->solve(draft_.start.p_W, in.goal_W, *draft_.planner_budget, work) == Status::kOk;
+  Status status = ways_->look(map_.view(), in.p_WB, config_.horizon_m + 1.0, *draft_.planner_budget, work);
+  if (status == Status::kOk) status = ways_->solve(draft_.start.p_W, in.goal_W, *draft_.planner_budget, work);
+  ways_known_ = status == Status::kOk;
+  out.no_way = status == Status::kNoPath;
   draft_.planner_work.units += work.units;
 }
 

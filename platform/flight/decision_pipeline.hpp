@@ -74,7 +74,8 @@ struct DecisionOutput {
   governor::Decision decision{};
   core::StageArray<core::Work> work{};
   core::StageArray<Nanos> cost{};
-  bool motion{};    ///< Something was seen to move nearby, not long ago.
+  bool no_way{};  ///< All that can be reached was seen, and none of it leads to the goal (WayMemory::solve).
+  bool motion{};  ///< Something was seen to move nearby, not long ago.
   Nanos latency{};  ///< Sum of the costs: when the result is there, counted from input.now.
 };
 
@@ -132,7 +133,7 @@ class DecisionPipeline {
   void plan(const DecisionInput& in, DecisionOutput& out) noexcept;
   void smooth(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// What is known of the ways, from here.
-  void remember(const DecisionInput& in) noexcept;
+  void remember(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// When the vehicle would be at the goal, counted from in.now.
   [[nodiscard]] double arrival_s(const Trajectory& trajectory, const DecisionInput& in) const noexcept;
   /// One search, with so much room around the vehicle; the path goes to kept_W_.
@@ -155,7 +156,7 @@ class DecisionPipeline {
   stages::Smoother& smoother_;
   stages::WayMemory* ways_;  ///< Null: the planner knows its horizon alone.
   bool ways_known_{false};   ///< In this decision.
-  stages::Path kept_W_;  ///< What was planned last.
+  stages::Path kept_W_;      ///< What was planned last.
   MotionWatch motion_;
   bool has_planned_{false};  ///< A plan was found since the take-off.
   Draft draft_;

@@ -15,7 +15,8 @@ namespace {
 
 constexpr int kReportDelay = 4;            // minor frames at most, from a commit to its report
 constexpr Nanos kIdlePeriod{100'000'000};  // of reports while there is nothing to decide
-constexpr Nanos kLatestStop{20'000'000};   // 12 cm at 6 m/s
+constexpr double kHover_mps = 0.3;
+constexpr Nanos kLatestStop{20'000'000};  // 12 cm at 6 m/s
 
 }  // namespace
 
@@ -53,6 +54,9 @@ void DecisionProgram::judge() noexcept {
   const bool fine = out_.smoother_status == Status::kOk || report_.site_known || in_.climbing ||
                     (answer && mail_.report.read().action != Action::kReturn);
   report_.failures = fine ? 0 : report_.failures + 1;
+  const bool hovers =
+      mail_.report.read().action == Action::kGoOn && !in_.climbing && in_.v_WB.norm() < kHover_mps;
+  no_way_ = hovers && out_.no_way ? no_way_ + 1 : 0;
   const std::uint64_t refusals = pipeline_.map().refusals();
   report_.map_refusals = refusals > refusals_before_ ? report_.map_refusals + 1 : 0;
   refusals_before_ = refusals;

@@ -40,6 +40,8 @@ class DecisionProgram final : public core::LaneProgram {
   /// The newest decision: complete once the smoother's slot has run.
   [[nodiscard]] const DecisionOutput& output() const noexcept { return out_; }
   [[nodiscard]] std::uint64_t decisions() const noexcept { return decisions_; }
+  /// Decisions in a row, hovering on the way to the mission's goal, whose memory of ways has none: some are proof.
+  [[nodiscard]] std::uint64_t no_way() const noexcept { return no_way_; }
   /// Trajectories that came too late for their own start; never decreases.
   [[nodiscard]] std::uint64_t too_late() const noexcept { return too_late_; }
 
@@ -72,6 +74,7 @@ class DecisionProgram final : public core::LaneProgram {
   DecisionOutput out_{};
   std::uint64_t decisions_{0};
   std::uint64_t too_late_{0};
+  std::uint64_t no_way_{0};
   std::atomic<bool> given_up_{false};
   Trajectory handed_over_{};
   DecisionReport report_{};

@@ -53,7 +53,7 @@ class FlightSystem {
   stages::PointCloud cloud_;
   stages::Smoother smoother_;
   std::optional<stages::WayMemory> ways_;  ///< Of the aware design, where the world fits.
-  governor::Governor governor_;  ///< Idle if the policy is the reader's own.
+  governor::Governor governor_;            ///< Idle if the policy is the reader's own.
   governor::DecisionPolicy& policy_;
   DecisionPipeline pipeline_;
   FlightControl control_;

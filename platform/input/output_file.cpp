@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -23,6 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kBuffer = 1U << 16U;
 constexpr int kMostLinks = 40;  // as the kernel
+constexpr std::string_view kPart = ".part";
 
 std::optional<struct stat> stat_of(const std::string& path) {
   struct stat s {};
@@ -110,6 +112,43 @@ bool same_file(const std::string& a, const std::string& b) {
   return in_a && in_b && same(*in_a, *in_b) && to_a.filename() == to_b.filename();
 }
 
+/// Whether the name still leads to the open file.
+bool is_still(int fd, const std::string& path) {
+  struct stat open_file {};
+  const auto there = stat_of(path);
+  return there && fstat(fd, &open_file) == 0 && same(*there, open_file);
+}
+
+bool is_number(std::string_view text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
+/// "PID" or "PID-TRY": what stands between a name and ".part".
+bool is_of_a_writer(std::string_view text) {
+  const std::size_t dash = text.find('-');
+  return is_number(text.substr(0, dash)) &&
+         (dash == std::string_view::npos || is_number(text.substr(dash + 1)));
+}
+
+/// Removes the parts of a file that nobody locks: their writer was killed. Whatever cannot be read or locked stays.
+void remove_stale_parts(const std::string& folder, const std::string& name) {
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    const std::string path = at->path().string();
+    const std::string file = at->path().filename().string();
+    if (!file.starts_with(name + ".") || !file.ends_with(kPart)) continue;
+    const std::size_t around = name.size() + 1 + kPart.size();
+    std::error_code none;
+    if (file.size() <= around || !is_of_a_writer(file.substr(name.size() + 1, file.size() - around)) ||
+        at->symlink_status(none).type() != fs::file_type::regular)
+      continue;
+    const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+    if (fd < 0) continue;
+    if (flock(fd, LOCK_EX | LOCK_NB) == 0 && is_still(fd, path)) (void)unlink(path.c_str());
+    (void)close(fd);
+  }
+}
+
 /// The file that standard output goes to, by its own name.
 bool is_standard_output(const std::string& path) {
   struct stat out {};
@@ -138,11 +177,16 @@ void OutputFile::open_part() {
   constexpr std::size_t kMostName = 200;  // the rest is for the ending
   constexpr int kTries = 100;             // of processes that were killed and had our number
   const std::string name = fs::path(target_).filename().string().substr(0, kMostName);
+  remove_stale_parts(folder_of(target_), name);
   for (int i = 0; fd_ < 0 && i < kTries; ++i) {
     const std::string ending = i == 0 ? "" : fmt::format("-{}", i);
-    part_ = fmt::format("{}/{}.{}{}.part", folder_of(target_), name, getpid(), ending);
+    part_ = fmt::format("{}/{}.{}{}{}", folder_of(target_), name, getpid(), ending, kPart);
     fd_ = open(part_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (fd_ < 0 && errno != EEXIST) break;
+    // Before it is locked another writer may take it for a dead one's. Without locks nobody does.
+    if (fd_ < 0 || flock(fd_, LOCK_EX) != 0 || is_still(fd_, part_)) continue;
+    (void)close(fd_);
+    fd_ = -1;
   }
   if (fd_ < 0) return;
   const auto before = stat_of(target_);

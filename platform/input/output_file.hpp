@@ -9,8 +9,9 @@ namespace roborun::input {
 
 /// A file that takes its name only when it is complete: until commit(), and after a kill, a full disk or a
 /// power loss, the file before is untouched. It is written beside its name (NAME.PID.part) and renamed, with
-/// the permissions of the file before; a symbolic link stays, and its target is written. What is no regular
-/// file (a FIFO, a device, /dev/stdout) is written through.
+/// the permissions of the file before; parts of NAME whose writer was killed are removed. A symbolic link
+/// stays, and its target is written. What is no regular file (a FIFO, a device, /dev/stdout) is written
+/// through.
 class OutputFile {
  public:
   /// Throws InputError "PATH: cannot be written: WHY".

@@ -1,6 +1,7 @@
-/// Ctrl-C and SIGTERM as a question that long work asks, instead of an end in the middle.
+/// Ctrl-C, SIGTERM and SIGHUP as a question that long work asks, instead of an end in the middle.
 #pragma once
 
+#include <array>
 #include <csignal>
 #include <stdexcept>
 
@@ -12,7 +13,8 @@ class Interrupted : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// While one lives, the first signal is kept for requested(); a second one ends the process at once.
+/// While one lives, the first signal is kept for requested(); a second one of its kind ends the process at once. SIGHUP
+/// stays ignored where it was (nohup).
 class StopOnSignal {
  public:
   StopOnSignal();
@@ -24,8 +26,7 @@ class StopOnSignal {
   [[nodiscard]] static bool requested() noexcept;
 
  private:
-  struct sigaction int_ {};
-  struct sigaction term_ {};
+  std::array<struct sigaction, 3> before_{};
 };
 
 }  // namespace roborun::input

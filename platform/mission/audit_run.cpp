@@ -412,6 +412,10 @@ void RealTimeRun::fly(const std::function<void(double)>& progress, report::Audit
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     report.seconds = passed_s();
     evidence_.take(lanes_, first_release_);
+    if (config_.stop && config_.stop()) {
+      report.interrupted = true;
+      break;
+    }
     if (!lanes_.lane(core::LaneId::kFlight).overdue(clock_.now())) (void)service.tell("WATCHDOG=1");
     if (report.seconds < told_s + 1.0) continue;
     told_s = report.seconds;
@@ -476,6 +480,8 @@ void RealTimeRun::fill_identity(report::AuditReport& report, const rt::IdleLaten
       {"nohz_full", id.nohz_full},
       {"idle_latency", idle.describe()},
       {"sched_rt_runtime_us", id.rt_runtime}};
+  if (report.interrupted)
+    report.identity.emplace_back("interrupted", fmt::format("after {:.1f} s", report.seconds));
 }
 
 report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress) {

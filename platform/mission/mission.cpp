@@ -22,6 +22,52 @@
 namespace roborun::mission {
 namespace {
 
+/// Block by block, at the map's finest.
+report::KnownSlice known_slice(const stages::MapView& view, const Aabb& bounds_W, double height_m) {
+  using Cell = report::KnownSlice::Cell;
+  using stages::kBlock_m;
+  using stages::kBlockCells;
+  const auto block = [](double at_m) { return static_cast<int>(std::floor(at_m / kBlock_m)); };
+  const int x0 = block(bounds_W.min_W.x());
+  const int y0 = block(bounds_W.min_W.y());
+  const int blocks_x = block(bounds_W.max_W.x()) - x0 + 1;
+  const int blocks_y = block(bounds_W.max_W.y()) - y0 + 1;
+  report::KnownSlice slice{height_m,
+                           kBlock_m / kBlockCells,
+                           x0 * kBlock_m,
+                           y0 * kBlock_m,
+                           blocks_x * kBlockCells,
+                           blocks_y * kBlockCells,
+                           {}};
+  slice.cell.resize(static_cast<std::size_t>(slice.columns) * static_cast<std::size_t>(slice.rows));
+  const int z =
+      std::clamp(static_cast<int>(std::floor((height_m - block(height_m) * kBlock_m) / slice.cell_m)), 0,
+                 kBlockCells - 1);
+  stages::CellBlock cells;
+  std::uint64_t lookups = 0;
+  for (int i = 0; i < blocks_x * blocks_y; ++i) {
+    const int column = i % blocks_x;
+    const int row = i / blocks_x;
+    const Vector3 corner_W((x0 + column) * kBlock_m, (y0 + row) * kBlock_m, block(height_m) * kBlock_m);
+    const stages::BlockContent content = view.read(corner_W, cells, lookups);
+    for (int k = 0; k < kBlockCells * kBlockCells; ++k) {
+      const int x = k % kBlockCells;
+      const int y = k / kBlockCells;
+      const auto of = [&](const stages::CellRows& rows) {
+        return (rows[static_cast<std::size_t>(kBlockCells * z + y)] >> x & 1U) != 0;
+      };
+      Cell cell = content == stages::BlockContent::kFree ? Cell::kFree : Cell::kUnknown;
+      if (content == stages::BlockContent::kMixed) {
+        if (of(cells.free)) cell = Cell::kFree;
+        if (of(cells.occupied)) cell = Cell::kOccupied;
+      }
+      slice.cell[static_cast<std::size_t>((row * kBlockCells + y) * slice.columns + column * kBlockCells +
+                                          x)] = cell;
+    }
+  }
+  return slice;
+}
+
 constexpr const char* kCustom = "custom";  // what the caller brought, in reports
 
 double quantile(std::vector<double> values, double q) {
@@ -263,6 +309,8 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
   report_.result.collided = judge_.collided();
   report_.pools = setup_.pools();
   report_.work = work_of(timed_map_, timed_planner_);
+  if (config_.keep_known)
+    report_.known = known_slice(system_.map().view(), world_.bounds_W(), world_.start_W().z());
   record_failsafe();
   summarise(std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count());
   return std::move(report_);

@@ -2,9 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "platform/input/input_error.hpp"
 #include "platform/sitl/sensors/lidar.hpp"
 
@@ -19,30 +16,6 @@ governor::Design design_of(const char* option, const std::string& name) {
       "{}: unknown design '{}': must be aware, static, static-fair, or several with commas between", option,
       name));
 }
-
-namespace {
-
-/// The vehicle must have room where it stands, on its way up to the start, and at the goal.
-void check_room(const sitl::World& world, double radius_m) {
-  const auto check = [&](const char* name, const Vector3& p_W) {
-    if (world.clearance_m(p_W, radius_m) < radius_m)
-      throw InputError(
-          fmt::format("{}: ({:.2f}, {:.2f}, {:.2f}) is closer than the vehicle's radius of {} m to an "
-                      "obstacle: must be free",
-                      name, p_W.x(), p_W.y(), p_W.z(), radius_m));
-  };
-  check("start", world.start_W());
-  check("goal", world.goal_W());
-  // From where it no longer touches what it stands on, which need not be even.
-  constexpr double kUneven_m = 0.3;
-  const Vector3 up_W = Vector3::UnitZ() * (radius_m + kUneven_m);
-  const Vector3 lowest_W = ground_below(world) + up_W;
-  const Vector3 climb_W = world.start_W() - lowest_W;
-  const int steps = climb_W.z() > 0.0 ? static_cast<int>(std::ceil(climb_W.z() / radius_m)) : 0;
-  for (int i = 0; i < steps; ++i) check("below the start", lowest_W + climb_W * i / steps);
-}
-
-}  // namespace
 
 flight::FlightConfig flight_config_of(const sitl::World& world, const MissionConfig& config) {
   flight::FlightConfig flight = config.flight;
@@ -61,7 +34,8 @@ flight::FlightConfig flight_config_of(const sitl::World& world, const MissionCon
   for (std::size_t i = 0; i < rig.cameras.size(); ++i)
     if (rig.cameras[i].model == CameraModel::kClean)
       flight.depth_error[i] = {noise.noise_m, noise.noise_per_m};
-  check_room(world, flight.vehicle.radius_m);
+  if (const std::string why = sitl::why_no_room(world, flight.vehicle.radius_m); !why.empty())
+    throw InputError(why);
   flight.seed = config.seed;
   return flight;
 }

@@ -47,7 +47,8 @@ struct SlowDown {
 /// When the judge ends a mission.
 struct JudgeConfig {
   double time_limit_s{7200.0};
-  double no_progress_s{120.0};  ///< Neither nearer to the goal nor far from where it was for so long: it is given up, hovering.
+  double no_progress_s{
+      120.0};  ///< Neither nearer to the goal nor far from where it was for so long: it is given up, hovering.
 };
 
 struct MissionConfig {
@@ -65,13 +66,13 @@ struct MissionConfig {
   JudgeConfig judge{};
   std::vector<TimedFault> faults{};  ///< At most sitl::FaultLine::kMost.
   std::string record{};              ///< File for the recording of the flight; empty: none.
+  bool keep_known{false};            ///< report.known, at the height of the world's start.
   /// Called after every minor frame, may be empty: what a test measures.
   std::function<void(const FrameRecord&)> each_frame{};
 };
 
 /// The flight through `world`: its bounds, its goal, the height of its start, and the rest from `config`.
-/// Throws InputError for a rig that cannot be, and for a vehicle that has no room at the goal, the start or
-/// on the way up to it.
+/// Throws InputError for a rig that cannot be, and for a vehicle that has no room (sitl::why_no_room).
 [[nodiscard]] flight::FlightConfig flight_config_of(const sitl::World& world, const MissionConfig& config);
 /// This vehicle flies the mission.
 void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle);

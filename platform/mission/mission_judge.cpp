@@ -11,7 +11,8 @@ constexpr double kHover_mps = 0.3;
 constexpr double kOwnApproach_mps = 0.3;  // less is swaying on the spot
 constexpr double kHolding_s = 5.0;        // of hovering, until a hold counts as the end
 constexpr double kHardTouchdown_mps = 2.0;
-constexpr double kMoved_m = 5.0;  // a way around may lead away from the goal
+constexpr double kMoved_m = 5.0;         // a way around may lead away from the goal
+constexpr std::uint64_t kProof = 5;      // decisions without a way
 constexpr double kOffGround_m = 0.5;     // higher than this over what it stood on: it has left it
 constexpr double kUneven_m = 0.3;        // how much ground may rise around where it stands
 constexpr double kGiveUpAfter_s = 60.0;  // what cannot even stop
@@ -89,7 +90,8 @@ const char* MissionJudge::judge(MonotonicTime now) {
   }
   if (s.battery_ratio <= 0.0) return "battery_empty";
   if (give_up_ == nullptr) {
-    if (seconds(now - best_at_) > config_.no_progress_s) give_up_ = "no_path_to_goal";
+    if (system_.decision_program().no_way() >= kProof) give_up_ = "no_way";
+    if (give_up_ == nullptr && seconds(now - best_at_) > config_.no_progress_s) give_up_ = "no_path_to_goal";
     if (seconds(now.time_since_epoch()) > config_.time_limit_s) give_up_ = "time_limit";
     if (give_up_ == nullptr) return nullptr;
     system_.decision_program().give_up();

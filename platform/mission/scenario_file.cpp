@@ -18,9 +18,9 @@
 namespace roborun::mission {
 namespace {
 
-constexpr std::array<const char*, 10> kOutcomes{"reached_goal",    "landed",    "holding",    "terminated",
+constexpr std::array<const char*, 11> kOutcomes{"reached_goal",    "landed",    "holding",    "terminated",
                                                 "killed",          "collision", "time_limit", "battery_empty",
-                                                "no_path_to_goal", "struck"};
+                                                "no_path_to_goal", "no_way",    "struck"};
 
 class ScenarioReader {
  public:
@@ -97,9 +97,8 @@ void ScenarioReader::read_head(Scenario& s) const {
   if (environment != nullptr) s.environment = text(*environment, "environment");
   if (const toml::node* node = head.get("vehicle")) {
     const std::string name = text(*node, "vehicle");
-    const std::vector<std::string> shipped = vehicle::shipped_vehicles();
-    const bool ships = std::find(shipped.begin(), shipped.end(), name) != shipped.end();
-    const std::string from = ships ? name : (std::filesystem::path(path_).parent_path() / name).string();
+    const std::string from =
+        vehicle::ships(name) ? name : (std::filesystem::path(path_).parent_path() / name).string();
     const vehicle::Vehicle vehicle = vehicle::load_vehicle(from);
     set_vehicle(s.config, vehicle);
     s.files.insert(s.files.end(), vehicle.patterns.begin(), vehicle.patterns.end());

@@ -18,10 +18,10 @@ constexpr double kResolution_us = 10.0;
 constexpr double kSignificant = 0.05;
 
 /// What was flown: figures of other flights are not comparable.
-constexpr std::array kFlown{"rate_Hz",    "asked_seconds",   "environment", "seed",
-                            "profile",    "profile_digest",  "vehicle",     "vehicle_digest",
-                            "settings",   "settings_digest", "load",        "bus",
-                            "kill_lines", "injected",        "real_time"};
+constexpr std::array kFlown{"rate_Hz",         "asked_seconds",  "interrupted", "environment",    "seed",
+                            "profile",         "profile_digest", "vehicle",     "vehicle_digest", "settings",
+                            "settings_digest", "load",           "bus",         "kill_lines",     "injected",
+                            "real_time"};
 /// What the two sides of a comparison are expected to differ in.
 constexpr std::array kProgram{"commit", "program_digest"};
 constexpr std::array kOfTheRun{"command", "date"};

@@ -171,6 +171,7 @@ std::string audit_html(const AuditReport& r) {
                      r.decision_stalls, xml_escape(r.stalled_in));
   if (!r.stopped_by.empty())
     h += fmt::format("<p class=\"bad\">Stopped by the overruns of {}</p>", xml_escape(r.stopped_by));
+  if (r.interrupted) h += "<p class=\"bad\">Interrupted: all figures are of the time until then</p>";
   h += "<h2>Identity</h2><table>";
   for (const auto& [key, value] : r.identity) h += row({key, value});
   h += "</table>\n";

@@ -168,6 +168,7 @@ std::string to_json(const AuditReport& r) {
   j["flown_m"] = r.flown_m;
   j["least_clearance_m"] = r.least_clearance_m;
   j["stopped_by"] = r.stopped_by;
+  j["interrupted"] = r.interrupted;
   if (r.commands) {
     const CommandPath& c = *r.commands;
     j["commands"] = {{"interfaces", c.interfaces}, {"sent", c.sent},         {"refused", c.refused},
@@ -307,6 +308,7 @@ std::string audit_table(const AuditReport& r) {
     text += fmt::format("the decision lane hung {} times, the last time in {}\n", r.decision_stalls,
                         r.stalled_in);
   if (!r.stopped_by.empty()) text += fmt::format("stopped by the overruns of {}\n", r.stopped_by);
+  if (r.interrupted) text += "interrupted: all figures are of the time until then\n";
   return text;
 }
 

@@ -126,6 +126,7 @@ struct AuditReport {
   std::string stalled_in;           ///< The slot of the last one.
   double flown_m{}, least_clearance_m{}, speed_mps{};  ///< The speed is that of the end.
   std::string stopped_by;                    ///< The slot whose overruns ended the run; empty if none did.
+  bool interrupted{};                        ///< Somebody ended the run before its time.
   std::optional<CommandPath> commands;       ///< Nothing over the simulated bus.
   std::optional<KillSwitchLog> kill_switch;  ///< Nothing of the simulated one.
   std::vector<AuditLane> lanes;

@@ -73,8 +73,8 @@ constexpr std::array kLaneFigures{
 constexpr std::array kRunFigures{
     RunFigure{"missing",         "things that real time needs and this run did without", 0,
               [](const AuditReport& r) -> Value { return number(r.missing.size()); }, always},
-    RunFigure{"stopped",         "1: overruns of a slot ended the run",                  0,
-              [](const AuditReport& r) -> Value { return r.stopped_by.empty() ? 0.0 : 1.0; }, always},
+    RunFigure{"stopped",         "1: overruns of a slot, or a signal, ended the run",    0,
+              [](const AuditReport& r) -> Value { return r.stopped_by.empty() && !r.interrupted ? 0.0 : 1.0; }, always},
     RunFigure{"heap_calls",      "of the lanes, after the start",                        0,
               [](const AuditReport& r) -> Value { return r.heap_sealed ? Value(number(r.heap_calls_after_start)) : Value(); }, always},
     RunFigure{"decisions_late",  "trajectories too late for their own start",            0,

@@ -38,6 +38,12 @@ std::string to_json(const MissionResult& r) {
   json["mission"] = r.mission;
   json["reason"] = r.reason;
   json["speed_limit_mps"] = r.speed_limit_mps;
+  if (r.suite) {
+    json["possible"] = r.suite->possible;
+    json["shortest_m"] = r.suite->shortest_m;
+    json["command"] = r.suite->command;
+  }
+  json["believed"] = r.believed;
   // Text from file names may be anything: invalid UTF-8 is replaced, never thrown over.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

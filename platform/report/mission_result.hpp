@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,13 @@ struct LatencySummary {
 };
 struct PrecisionSummary {
   double min{}, median{}, max{};
+};
+
+/// What a flight of a suite of worlds has besides.
+struct SuiteFlight {
+  bool possible{};      ///< The judge of ways finds one.
+  double shortest_m{};  ///< Its length; NaN without a way.
+  std::string command;  ///< That flies it again.
 };
 
 /// Names and order are those of the JSON object.
@@ -45,6 +53,8 @@ struct MissionResult {
   std::string mission;
   std::string reason;        ///< Why the mission ended.
   double speed_limit_mps{};  ///< v_max of the design.
+  bool believed{true};       ///< False: a plugin took more time than the work that it counted is worth.
+  std::optional<SuiteFlight> suite;  ///< Three more keys, or none.
 };
 
 /// One decision, for traces and plots.
@@ -117,6 +127,16 @@ struct SafetyRecord {
   Vector3 end_W = Vector3::Zero();
 };
 
+/// What the vehicle's map knew at one height when the mission ended, from above.
+struct KnownSlice {
+  enum class Cell : std::uint8_t { kUnknown, kFree, kOccupied };
+  double height_m{};
+  double cell_m{};
+  double x_m{}, y_m{};  ///< Lowest corner.
+  int columns{}, rows{};
+  std::vector<Cell> cell;  ///< [row * columns + column].
+};
+
 struct MissionReport {
   MissionResult result;
   std::vector<DecisionRecord> decisions;
@@ -124,6 +144,7 @@ struct MissionReport {
   std::vector<PoolUse> pools;
   std::vector<WorkRecord> work;
   SafetyRecord safety;
+  KnownSlice known;  ///< Empty unless it was asked for.
 };
 
 /// What missions are compared by.

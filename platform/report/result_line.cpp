@@ -18,7 +18,7 @@ double number(const Json& json) {
 
 std::string to_line(const MissionResult& result) {
   Json json = Json::parse(to_json(result));
-  json.erase("real_time_factor");
+  for (const char* of_the_clock : {"real_time_factor", "believed"}) json.erase(of_the_clock);
   return json.dump();
 }
 
@@ -53,6 +53,8 @@ std::optional<MissionResult> from_line(const std::string& line) {
     r.mission = json.at("mission");
     r.reason = json.at("reason");
     r.speed_limit_mps = number(json.at("speed_limit_mps"));
+    if (json.contains("possible"))
+      r.suite = SuiteFlight{json.at("possible"), number(json.at("shortest_m")), json.at("command")};
     return r;
   } catch (const std::exception&) {
     return std::nullopt;

@@ -63,14 +63,18 @@ class Svg {
     add(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="{}" font-size="{}" fill="{}" font-weight="{}">{}</text>)",
         x, y, anchor, size, fill, weight, xml_escape(what));
   }
-  /// The whole file.
-  [[nodiscard]] std::string finish(double width, double height) const {
+  /// The whole file; `title` and `description` (may be empty) are for those who cannot see it.
+  [[nodiscard]] std::string finish(double width, double height, const std::string& title = {},
+                                   const std::string& description = {}) const {
+    std::string head;
+    if (!title.empty())
+      head = fmt::format("<title>{}</title>\n<desc>{}</desc>\n", xml_escape(title), xml_escape(description));
     return fmt::format(
         R"(<svg xmlns="http://www.w3.org/2000/svg" width="{0:.0f}" height="{1:.0f}" viewBox="0 0 {0:.0f} {1:.0f}" font-family="Helvetica, Arial, sans-serif">
-<rect width="100%" height="100%" fill="#ffffff"/>
+{3}<rect width="100%" height="100%" fill="#ffffff"/>
 {2}</svg>
 )",
-        width, height, body_);
+        width, height, body_, head);
   }
 
  private:

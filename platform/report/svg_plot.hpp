@@ -20,11 +20,14 @@ struct Scene {
     double x_m, y_m, width_m, height_m;
   };
   std::string title;
+  const char* background{"#f7f9fb"};
   Aabb bounds_W{};
   Vector3 start_W = Vector3::Zero();
   Vector3 goal_W = Vector3::Zero();
   std::vector<Circle> circles;
   std::vector<Rect> rects;
+  std::vector<std::vector<std::array<double, 2>>>
+      outlines;  ///< Of other shapes: (x, y) of the corners, in turn.
   /// Zones A | B | C: where the congested ends stop, x of the two dashed lines; empty if the world has no
   /// zones.
   std::vector<double> zone_borders_m;

@@ -9,6 +9,6 @@ struct ShippedVehicle {
   const char* name;
   const char* text;
 };
-extern const std::array<ShippedVehicle, 5> kShippedVehicles;
+extern const std::array<ShippedVehicle, 7> kShippedVehicles;
 
 }  // namespace roborun::vehicle

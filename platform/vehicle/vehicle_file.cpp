@@ -37,6 +37,33 @@ std::set<std::string_view> tables() {
   return names;
 }
 
+constexpr const char* kSix = "-six";
+
+/// Six cameras with the range, rate and latency of its first, which see everything around it.
+void see_all_round(Vehicle& vehicle) {
+  vehicle.name += kSix;
+  vehicle.digest += kSix;
+  vehicle.about += "; this one has six, all round";
+  CameraSpec camera = vehicle.rig.cameras[0];
+  const CameraSpec wide;
+  camera.width = wide.width;
+  camera.height = wide.height;
+  camera.tan_half_width = camera.tan_half_height = wide.tan_half_width;
+  camera.range_min_m = wide.range_min_m;  // the one below stands on the ground
+  vehicle.rig.cameras.clear();
+  vehicle.rig.lidars.clear();
+  vehicle.patterns.clear();
+  constexpr double kRight_deg = 90.0;
+  for (const double yaw_deg : {0.0, kRight_deg, 2.0 * kRight_deg, 3.0 * kRight_deg}) {
+    camera.mount = {.yaw_deg = yaw_deg};
+    (void)vehicle.rig.cameras.push_back(camera);
+  }
+  for (const double pitch_deg : {-kRight_deg, kRight_deg}) {
+    camera.mount = {.pitch_deg = pitch_deg};
+    (void)vehicle.rig.cameras.push_back(camera);
+  }
+}
+
 class VehicleReader {
  public:
   VehicleReader(const std::string& path, const std::string& text)
@@ -194,6 +221,12 @@ Vehicle vehicle_from_toml(const std::string& path, const std::string& text) {
   return vehicle;
 }
 
+bool ships(const std::string& name) {
+  return std::any_of(kShippedVehicles.begin(), kShippedVehicles.end(), [&name](const ShippedVehicle& v) {
+    return name == v.name || name == v.name + std::string(kSix);
+  });
+}
+
 std::vector<std::string> shipped_vehicles() {
   std::vector<std::string> names;
   names.reserve(kShippedVehicles.size());
@@ -203,7 +236,14 @@ std::vector<std::string> shipped_vehicles() {
 
 Vehicle load_vehicle(const std::string& name_or_path) {
   for (const ShippedVehicle& v : kShippedVehicles) {
-    if (name_or_path == v.name) return vehicle_from_toml(v.name, v.text);
+    const bool six = name_or_path == v.name + std::string(kSix);
+    if (!six && name_or_path != v.name) continue;
+    Vehicle vehicle = vehicle_from_toml(v.name, v.text);
+    if (!six) return vehicle;
+    if (vehicle.rig.cameras.empty())
+      throw InputError(fmt::format("{}: {} has no camera: must be a vehicle with one", name_or_path, v.name));
+    see_all_round(vehicle);
+    return vehicle;
   }
   return vehicle_from_toml(name_or_path,
                            input::read_text(name_or_path, fmt::format("a vehicle file, or one of {}",

@@ -28,8 +28,11 @@ struct Vehicle {
 /// [gnss]; without it: `clean`. A camera of another model may have `invalid_ratio`. Throws InputError with file, line, key and what would be right, also for a vehicle
 /// that cannot fly.
 [[nodiscard]] Vehicle vehicle_from_toml(const std::string& path, const std::string& text);
-/// A shipped vehicle by its name, or one of a file. Throws InputError.
+/// A shipped vehicle by its name, or one of a file. NAME-six is a shipped vehicle that has six cameras of 90 x 90 degrees
+/// and 96 x 96 pixels all round in the place of its sensors, which else are as its first camera. Throws InputError.
 [[nodiscard]] Vehicle load_vehicle(const std::string& name_or_path);
+/// True if load_vehicle takes it from the program, not from a file.
+[[nodiscard]] bool ships(const std::string& name);
 /// Names of the shipped vehicles, `paper` first.
 [[nodiscard]] std::vector<std::string> shipped_vehicles();
 /// Every key of a vehicle file; a sensor's in the tables "[camera]" and "[lidar]".

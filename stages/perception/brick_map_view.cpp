@@ -114,14 +114,16 @@ bool BrickMap::box_free(const Aabb& box_W, int level, double radius_m,
   return true;
 }
 
-BlockContent BrickMap::read(const Vector3& corner_W, CellBlock& cells, std::uint64_t& lookups) const noexcept {
+BlockContent BrickMap::read(const Vector3& corner_W, CellBlock& cells,
+                            std::uint64_t& lookups) const noexcept {
   static_assert(kBlockCells == kBrickCells);
   ++lookups;
   Cell corner{};
   if (!is_finite(corner_W)) return BlockContent::kUnknown;
   const Vector3 middle_W = corner_W + Vector3::Constant(0.5 * kBrick_m);
   const Vector3 local = (middle_W - corner_W_) / kBrick_m;
-  corner = {static_cast<std::int32_t>(std::floor(local.x())), static_cast<std::int32_t>(std::floor(local.y())),
+  corner = {static_cast<std::int32_t>(std::floor(local.x())),
+            static_cast<std::int32_t>(std::floor(local.y())),
             static_cast<std::int32_t>(std::floor(local.z()))};
   const Brick* brick = brick_within(corner.x, corner.y, corner.z, std::numeric_limits<double>::infinity());
   if (brick == nullptr) return BlockContent::kUnknown;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 namespace roborun::stages {
 namespace {
@@ -32,13 +31,11 @@ LatticeSearch::LatticeSearch(std::size_t max_nodes, core::Arena& arena) noexcept
     : state_(arena.take<std::uint8_t>(max_nodes, "lattice states")),
       state_pool_(arena.last_pool()),
       cost_(arena.take<std::uint32_t>(max_nodes, "lattice costs")),
-      cost_pool_(arena.last_pool()) {
-  side_[0].heap = arena.take<std::uint64_t>(kHeap, "lattice heap, start");
-  side_[0].pool = &arena.last_pool();
-  side_[1].heap = arena.take<std::uint64_t>(kHeap, "lattice heap, goal");
-  side_[1].pool = &arena.last_pool();
+      cost_pool_(arena.last_pool()),
+      side_{Side{{kHeap, "lattice heap, start", arena}}, Side{{kHeap, "lattice heap, goal", arena}}} {
   // Most flights need none of it.
-  for (core::PoolRecord* pool : {&state_pool_, &cost_pool_, side_[0].pool, side_[1].pool}) pool->use(0);
+  state_pool_.use(0);
+  cost_pool_.use(0);
 }
 
 bool LatticeSearch::lay_out(const PlanRequest& request, int cells) noexcept {
@@ -62,7 +59,7 @@ bool LatticeSearch::lay_out(const PlanRequest& request, int cells) noexcept {
   state_pool_.use(static_cast<std::size_t>(nodes));
   cost_pool_.use(static_cast<std::size_t>(nodes));
   std::fill_n(state_.begin(), static_cast<std::size_t>(nodes), std::uint8_t{0});
-  for (Side& side : side_) side.count = 0;
+  for (Side& side : side_) side.opened.clear();
   side_[0].from_W = side_[1].to_W = request.start_W;
   side_[1].from_W = side_[0].to_W = request.goal_W;
   overflown_ = false;
@@ -74,21 +71,18 @@ void LatticeSearch::push(int side, std::uint32_t index, std::uint32_t cost, std:
   const auto opened = static_cast<std::uint8_t>(kOpened << static_cast<unsigned>(side));
   std::uint8_t& state = state_[index];
   if ((state & (kBlocked | kClosed | opened)) != 0) return;
-  if (s.count == s.heap.size()) {
-    overflown_ = true;
-    return;
-  }
-  state |= opened;
   const std::uint64_t promise = cost + kWeight * units((s.to_W - at_W(index)).norm());
-  s.pool->use(s.count + 1);
-  s.heap[s.count++] = (((promise << kIndexBits) | index) << 3U) | move;
-  std::push_heap(s.heap.begin(), s.heap.begin() + static_cast<std::ptrdiff_t>(s.count), std::greater<>());
+  if (s.opened.push((((promise << kIndexBits) | index) << 3U) | move))
+    state |= opened;
+  else
+    overflown_ = true;
 }
 
 void LatticeSearch::seed(const Task& task, int side) noexcept {
   const Vector3& from_W = side_[static_cast<std::size_t>(side)].from_W;
   const Vector3 local = (from_W - corner_W_) / step_m_;
-  const Cell low{static_cast<std::int32_t>(std::floor(local.x())), static_cast<std::int32_t>(std::floor(local.y())),
+  const Cell low{static_cast<std::int32_t>(std::floor(local.x())),
+                 static_cast<std::int32_t>(std::floor(local.y())),
                  static_cast<std::int32_t>(std::floor(local.z()))};
   for (int corner = 0; corner < 8; ++corner) {
     const Cell c{low.x + (corner & 1), low.y + ((corner >> 1) & 1), low.z + (corner >> 2)};
@@ -101,8 +95,7 @@ void LatticeSearch::seed(const Task& task, int side) noexcept {
 
 bool LatticeSearch::step(const Task& task, int side) noexcept {
   Side& s = side_[static_cast<std::size_t>(side)];
-  std::pop_heap(s.heap.begin(), s.heap.begin() + static_cast<std::ptrdiff_t>(s.count), std::greater<>());
-  const std::uint64_t entry = s.heap[--s.count];
+  const std::uint64_t entry = s.opened.pop();
   const auto move = static_cast<std::uint8_t>(entry & 7U);
   const auto at = static_cast<std::uint32_t>((entry >> 3U) & ((1U << kIndexBits) - 1U));
   std::uint8_t& state = state_[at];
@@ -122,7 +115,7 @@ bool LatticeSearch::step(const Task& task, int side) noexcept {
     const auto& m = kMove[move];
     cost_[at] = cost_[index_of({cell.x - m[0], cell.y - m[1], cell.z - m[2]})] + units(step_m_);
   }
-  for (std::uint8_t next = 0; next < kMove.size(); ++next) {
+  for (std::size_t next = 0; next < kMove.size(); ++next) {
     const Cell to{cell.x + kMove[next][0], cell.y + kMove[next][1], cell.z + kMove[next][2]};
     if (!inside(to)) continue;
     const std::uint32_t index = index_of(to);
@@ -131,13 +124,13 @@ bool LatticeSearch::step(const Task& task, int side) noexcept {
       met_[static_cast<std::size_t>(1 - side)] = index;
       return true;
     }
-    push(side, index, cost_[at] + units(step_m_), next);
+    push(side, index, cost_[at] + units(step_m_), static_cast<std::uint8_t>(next));
   }
   return false;
 }
 
 Status LatticeSearch::run(const Task& task) noexcept {
-  for (std::uint32_t i = 1; side_[0].count > 0 && side_[1].count > 0; ++i) {
+  for (std::uint32_t i = 1; !side_[0].opened.empty() && !side_[1].opened.empty(); ++i) {
     if (i % kPollEvery == 0 && task.budget.spent(task.work)) return Status::kBudgetSpent;
     if (step(task, static_cast<int>(i % 2))) return Status::kOk;
   }

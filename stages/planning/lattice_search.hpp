@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-#include "core/memory/arena.hpp"
+#include "core/memory/least_first.hpp"
 #include "stages/planning/planner.hpp"
 
 namespace roborun::stages {
@@ -19,7 +19,8 @@ namespace roborun::stages {
 class LatticeSearch {
  public:
   [[nodiscard]] static constexpr std::size_t arena_bytes(std::size_t max_nodes) noexcept {
-    return max_nodes * (sizeof(std::uint32_t) + sizeof(std::uint8_t)) + 2 * kHeap * sizeof(std::uint64_t) + 256;
+    return max_nodes * (sizeof(std::uint32_t) + sizeof(std::uint8_t)) + 2 * kHeap * sizeof(std::uint64_t) +
+           256;
   }
   /// A lattice with more nodes than that is not searched. [4096, 2^22]
   LatticeSearch(std::size_t max_nodes, core::Arena& arena) noexcept;
@@ -43,9 +44,7 @@ class LatticeSearch {
   };
   /// One of the two ends: what it has opened and not yet closed, least promise first.
   struct Side {
-    std::span<std::uint64_t> heap;
-    core::PoolRecord* pool{};
-    std::size_t count{};
+    core::LeastFirst opened{};
     Vector3 from_W = Vector3::Zero(), to_W = Vector3::Zero();
   };
 

@@ -18,7 +18,7 @@ constexpr double kGoalBias = 0.15;
 constexpr double kEscape_m = 2.0;
 constexpr std::uint64_t kSpare = 4096;  // lookups that are granted whatever the budget says
 constexpr double kKnownReach_m = 15.0;
-constexpr double kLookAhead_m = 12.0;   // beyond a path's end
+constexpr double kLookAhead_m = 12.0;  // beyond a path's end
 // What a surface right ahead of a path's end costs: the way around a pillar.
 constexpr double kDetour_m = 10.0;
 
@@ -328,7 +328,8 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
       if (is_segment_free(spare_view, request.start_W, end_W, request.radius_m, work.units) && may_add())
         best = add_node(end_W, 0, work);
     }
-    if (best > 0 && free_m >= to_target_m && request.bounds_W.contains(target_W) && leads_on(request, target_W)) {
+    if (best > 0 && free_m >= to_target_m && request.bounds_W.contains(target_W) &&
+        leads_on(request, target_W)) {
       extract(request, spare_view, best, result);
       result.reaches_goal = target_W == request.goal_W;
       return goal_bad ? Status::kGoalBlocked : Status::kOk;
@@ -345,7 +346,9 @@ bool RrtStar::follow_ways(Search& s, const MapView& map, double below_m, PlanRes
   const std::size_t count = s.request.ways->known_way(s.request.start_W, reach_m - 1.0, way_W);
   for (std::size_t i = count; i-- > 0;) {
     const double rest_m = kUnknownWeight * s.request.ways->to_goal_m(way_W[i]);
-    if ((way_W[i] - s.request.start_W).norm() < 1.0 || !((way_W[i] - s.request.start_W).norm() + rest_m < below_m)) continue;
+    if ((way_W[i] - s.request.start_W).norm() < 1.0 ||
+        !((way_W[i] - s.request.start_W).norm() + rest_m < below_m))
+      continue;
     PlanRequest request = s.request;
     request.goal_W = way_W[i];
     request.horizon_m = reach_m;
@@ -355,7 +358,8 @@ bool RrtStar::follow_ways(Search& s, const MapView& map, double below_m, PlanRes
     PlanResult found;
     found.work = {};
     const Status status = connect(to_it, found);
-    if ((status != Status::kOk && status != Status::kBudgetSpent) || !(found.cost_m + rest_m < below_m)) continue;
+    if ((status != Status::kOk && status != Status::kBudgetSpent) || !(found.cost_m + rest_m < below_m))
+      continue;
     result.path_W = found.path_W;
     result.cost_m = found.cost_m;
     return true;
@@ -393,11 +397,11 @@ Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32
   }
 
   // Better than standing still by at least one cell of the view.
-  const double stay_m =
-      promise_m(node(0), request) + detour_m(request, view, request.start_W, work.units);
+  const double stay_m = promise_m(node(0), request) + detour_m(request, view, request.start_W, work.units);
   if (request.ways != nullptr && follow_ways(s, map, std::fmin(best_m, stay_m) - view.cell_m(), result))
     return goal_bad ? Status::kGoalBlocked : Status::kOk;
-  if (best == 0 || !(best_m <= stay_m - view.cell_m())) return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
+  if (best == 0 || !(best_m <= stay_m - view.cell_m()))
+    return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
   Spare spare(work);
   extract(request, PolledView(map, spare, work), best, result);
   if (result.path_W.size() < 2) return Status::kNoPath;

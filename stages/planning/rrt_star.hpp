@@ -34,7 +34,8 @@ class RrtStar final : public Planner {
     double rewire_m{8.0};             ///< Largest neighbourhood. [0.5, 50]
     /// Samples without an improvement of 1 % after which the answer is taken. [16, 1000000]
     std::uint32_t patience{250};
-    std::size_t lattice_nodes{1U << 20U};  ///< Of the lattice that is searched where sampling fails. [4096, 2^22]
+    std::size_t lattice_nodes{
+        1U << 20U};  ///< Of the lattice that is searched where sampling fails. [4096, 2^22]
     [[nodiscard]] constexpr Status validate() const noexcept {
       const bool ok = max_nodes >= 16 && max_nodes <= 100000 && max_samples >= 16 && max_samples <= 1000000 &&
                       step_m >= 0.5 && step_m <= 50 && rewire_m >= 0.5 && rewire_m <= 50 && patience >= 16 &&

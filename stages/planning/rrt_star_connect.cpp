@@ -192,7 +192,8 @@ Status RrtStar::improve(Search& s, double best_m, Path& best_W) noexcept {
 bool RrtStar::find_on_lattice(Search& s) noexcept {
   Path path_W;
   clear(s);
-  if (lattice_.connect(s.request, s.view, s.budget, s.work, path_W) != Status::kOk || path_W.size() + 1 > node_.size())
+  if (lattice_.connect(s.request, s.view, s.budget, s.work, path_W) != Status::kOk ||
+      path_W.size() + 1 > node_.size())
     return false;
   std::int32_t parent = 0;
   for (std::size_t i = 1; i < path_W.size() && may_add(); ++i) parent = add_node(path_W[i], parent, s.work);

@@ -381,8 +381,8 @@ namespace {
 
 /// Of the curve between two times, along a chord. Around a slanting chord there is more than the vehicle touches, around
 /// parts of it there is less.
-bool is_chord_free(const MapView& view, const Trajectory& trajectory, double from_s, double to_s, double radius_m,
-                   std::uint64_t& lookups) noexcept {
+bool is_chord_free(const MapView& view, const Trajectory& trajectory, double from_s, double to_s,
+                   double radius_m, std::uint64_t& lookups) noexcept {
   constexpr int kParts = 8;
   const Vector3 r = Vector3::Constant(radius_m);
   const auto is_swept_free = [&](const Vector3& a_W, const Vector3& b_W) {

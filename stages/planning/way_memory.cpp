@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/random/counter_rng.hpp"
 #include "core/precision.hpp"
+#include "core/random/counter_rng.hpp"
 #include "firmware_if/assert.hpp"
 
 namespace roborun::stages {
@@ -16,7 +16,7 @@ constexpr std::int32_t kWindow = 13, kWindowHeight = 9;  // blocks of one look, 
 constexpr std::size_t kWindowBlocks =
     static_cast<std::size_t>(kWindow + 1) * (kWindow + 1) * (kWindowHeight + 1);
 constexpr double kMost_m = 1e5;
-constexpr double kStands_m = 0.3;          // from one look to the next
+constexpr double kStands_m = 0.3;  // from one look to the next
 constexpr std::uint32_t kMostWaits = 128;
 constexpr std::uint64_t kWorkOfABlock = 64;  // lookups that a block that changed counts as
 
@@ -25,7 +25,8 @@ std::int32_t whole(double x) noexcept { return static_cast<std::int32_t>(std::fl
 std::uint64_t digest_of(const CellBlock& cells) noexcept {
   std::uint64_t digest = 1;
   for (std::size_t i = 0; i < cells.free.size(); i += 2) {
-    const std::uint64_t four = (std::uint64_t{cells.free[i]} << 48U) | (std::uint64_t{cells.free[i + 1]} << 32U) |
+    const std::uint64_t four = (std::uint64_t{cells.free[i]} << 48U) |
+                               (std::uint64_t{cells.free[i + 1]} << 32U) |
                                (std::uint64_t{cells.occupied[i]} << 16U) | cells.occupied[i + 1];
     digest = (digest ^ four) * 0x9E3779B97F4A7C15ULL;
     digest ^= digest >> 29U;
@@ -64,8 +65,9 @@ bool WayMemory::fits(const Config& config) noexcept {
 
 std::size_t WayMemory::arena_bytes(const Config& config) noexcept {
   const auto count = static_cast<std::size_t>(extent_of(config).blocks);
-  return count * (sizeof(Position) + sizeof(Node)) + config.max_blocks * (sizeof(Block) + kRooms * sizeof(Node)) +
-         kWindowBlocks * sizeof(Seen) + kHeap * sizeof(std::uint64_t) + 1024;
+  return count * (sizeof(Position) + sizeof(Node)) +
+         config.max_blocks * (sizeof(Block) + kRooms * sizeof(Node)) + kWindowBlocks * sizeof(Seen) +
+         kHeap * sizeof(std::uint64_t) + 1024;
 }
 
 WayMemory::WayMemory(const Config& config, core::Arena& arena) noexcept
@@ -79,8 +81,7 @@ WayMemory::WayMemory(const Config& config, core::Arena& arena) noexcept
       window_pool_(arena.last_pool()),
       node_(arena.take<Node>(position_.size() + kRooms * config.max_blocks, "way nodes")),
       node_pool_(arena.last_pool()),
-      heap_(arena.take<std::uint64_t>(kHeap, "way heap")),
-      heap_pool_(arena.last_pool()) {
+      reached_(kHeap, "way heap", arena) {
   const Extent e = extent_of(config);
   corner_ = {e.corner[0], e.corner[1], e.corner[2]};
   size_ = {e.size[0], e.size[1], e.size[2]};
@@ -180,11 +181,13 @@ std::uint64_t WayMemory::cells_at(const Cell& block, const Cell& low, const Cell
   const std::int32_t wide_x = high.x - low.x + 2, wide_y = high.y - low.y + 2;
   std::uint64_t digest = 0;
   for (std::int32_t i = 0; i < 8; ++i) {
-    const std::int32_t x = block.x - low.x + (i & 1), y = block.y - low.y + ((i >> 1) & 1), z = block.z - low.z + (i >> 2);
-    const auto w = static_cast<std::size_t>((z * wide_y + y) * wide_x + x);
-    cells.block[static_cast<std::size_t>(i)] = &window_[w].cells;
-    cells.content[static_cast<std::size_t>(i)] = window_[w].content;
-    digest = core::mix64(digest + window_[w].digest + 1);
+    const std::int32_t x = block.x - low.x + (i & 1), y = block.y - low.y + ((i >> 1) & 1),
+                       z = block.z - low.z + (i >> 2);
+    const std::int32_t w = (z * wide_y + y) * wide_x + x;
+    const Seen& seen = window_[static_cast<std::size_t>(w)];
+    cells.block[static_cast<std::size_t>(i)] = &seen.cells;
+    cells.content[static_cast<std::size_t>(i)] = seen.content;
+    digest = core::mix64(digest + seen.digest + 1);
   }
   return digest | 1U;
 }
@@ -194,15 +197,18 @@ Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, c
   if (!is_finite(p_W) || !(p_W.cwiseAbs().maxCoeff() < kMost_m)) return Status::kInvalidArgument;
   const Cell at = place_of(p_W);
   const auto blocks = static_cast<std::int32_t>(std::ceil(std::fmin(reach_m, kMost_m) / kBlock_m));
-  const std::int32_t side = std::min(blocks, (kWindow - 1) / 2), up = std::min(blocks, (kWindowHeight - 1) / 2);
-  const Cell low{std::max((at.x >> 4) - side, 0), std::max((at.y >> 4) - side, 0), std::max((at.z >> 4) - up, 0)};
+  const std::int32_t side = std::min(blocks, (kWindow - 1) / 2),
+                     up = std::min(blocks, (kWindowHeight - 1) / 2);
+  const Cell low{std::max((at.x >> 4) - side, 0), std::max((at.y >> 4) - side, 0),
+                 std::max((at.z >> 4) - up, 0)};
   const Cell high{std::min((at.x >> 4) + side, size_.x - 1), std::min((at.y >> 4) + side, size_.y - 1),
                   std::min((at.z >> 4) + up, size_.z - 1)};
   if (low.x > high.x || low.y > high.y || low.z > high.z) return Status::kInvalidArgument;
   if (!read_window(map, low, high, budget, work)) return Status::kBudgetSpent;
   if (seen_low_.x > seen_high_.x) seen_low_ = low, seen_high_ = high;
   seen_low_ = {std::min(seen_low_.x, low.x), std::min(seen_low_.y, low.y), std::min(seen_low_.z, low.z)};
-  seen_high_ = {std::max(seen_high_.x, high.x), std::max(seen_high_.y, high.y), std::max(seen_high_.z, high.z)};
+  seen_high_ = {std::max(seen_high_.x, high.x), std::max(seen_high_.y, high.y),
+                std::max(seen_high_.z, high.z)};
   wait_at(p_W);
   std::size_t changed = 0;
   bool spent = false;
@@ -251,7 +257,8 @@ void WayMemory::forbid(const Cell& block, WayPlaces& places) const noexcept {
   for (std::int32_t i = 0; i < 256; ++i) {
     for (std::int32_t x = 0; x < kBlockCells; ++x) {
       const Vector3 p_W = at_W({first.x + x, first.y + i % kBlockCells, first.z + i / kBlockCells});
-      if (bounds_W.contains(p_W) && (config_.fence.empty() || config_.fence.allows(Aabb{p_W - r, p_W + r}))) continue;
+      if (bounds_W.contains(p_W) && (config_.fence.empty() || config_.fence.allows(Aabb{p_W - r, p_W + r})))
+        continue;
       const auto keep = static_cast<std::uint16_t>(~(1U << static_cast<unsigned>(x)));
       places.known[static_cast<std::size_t>(i)] &= keep;
       places.open[static_cast<std::size_t>(i)] &= keep;
@@ -268,8 +275,8 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   };
   const std::uint32_t position = position_of(block);
   std::int32_t& kind = position_[position].kind;
-  const std::int32_t uniform = all(places.known, 0xFFFF)  ? kKnown
-                               : all(places.open, 0xFFFF) ? kOpen
+  const std::int32_t uniform = all(places.known, 0xFFFF)                     ? kKnown
+                               : all(places.open, 0xFFFF)                    ? kOpen
                                : all(places.known, 0) && all(places.open, 0) ? kClosed
                                                                              : 0;
   if (uniform < 0) {
@@ -335,9 +342,9 @@ void WayMemory::find_face_doors(Block& b, const Cell& block, std::size_t face) n
       if (du * du + dv * dv < best) best = du * du + dv * dv, best_at = i;
     }
     const Cell c = cell(best_at % 16, best_at / 16);
-    b.door[face][b.doors[face]++] = {static_cast<std::uint8_t>(rooms / kRooms), static_cast<std::uint8_t>(rooms % kRooms),
-                                     static_cast<std::uint8_t>(c.x), static_cast<std::uint8_t>(c.y),
-                                     static_cast<std::uint8_t>(c.z)};
+    b.door[face][b.doors[face]++] = {
+        static_cast<std::uint8_t>(rooms / kRooms), static_cast<std::uint8_t>(rooms % kRooms),
+        static_cast<std::uint8_t>(c.x), static_cast<std::uint8_t>(c.y), static_cast<std::uint8_t>(c.z)};
   }
 }
 
@@ -359,8 +366,8 @@ void WayMemory::find_inner_doors(Block& b) noexcept {
           const unsigned other = b.rooms.at(nx, ny, nz);
           if (other >= kFirstOpenRoom) what(room * kFirstOpenRoom + other - kFirstOpenRoom, x, y, z);
         };
-        beside(x + 1, y, z), beside(x - 1, y, z), beside(x, y + 1, z), beside(x, y - 1, z), beside(x, y, z + 1),
-            beside(x, y, z - 1);
+        beside(x + 1, y, z), beside(x - 1, y, z), beside(x, y + 1, z), beside(x, y - 1, z),
+            beside(x, y, z + 1), beside(x, y, z - 1);
       }
     }
   };
@@ -378,8 +385,8 @@ void WayMemory::find_inner_doors(Block& b) noexcept {
     if (away >= best[rooms]) return;
     best[rooms] = away;
     door[rooms] = {static_cast<std::uint8_t>(rooms / kFirstOpenRoom),
-                   static_cast<std::uint8_t>(rooms % kFirstOpenRoom + kFirstOpenRoom), static_cast<std::uint8_t>(x),
-                   static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(z)};
+                   static_cast<std::uint8_t>(rooms % kFirstOpenRoom + kFirstOpenRoom),
+                   static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(z)};
   });
   for (std::size_t i = 0; i < pair.size() && b.doors[kInside] < kDoorsPerFace; ++i) {
     if (pair[i].count > 0) b.door[kInside][b.doors[kInside]++] = door[i];

@@ -9,7 +9,7 @@
 #include "core/executive/stage_budget.hpp"
 #include "core/geometry/fence.hpp"
 #include "core/geometry/vector.hpp"
-#include "core/memory/arena.hpp"
+#include "core/memory/least_first.hpp"
 #include "firmware_if/status.hpp"
 #include "stages/perception/map_view.hpp"
 #include "stages/planning/way_rooms.hpp"
@@ -41,13 +41,15 @@ class WayMemory {
               core::Work& work) noexcept;
   /// The ways to the goal from everywhere that is not farther from it than the vehicle. kOk; kNoPath: there is none, as
   /// far as is known now; kStartBlocked, kGoalBlocked: no place of the vehicle is near; kBudgetSpent: no answer.
-  Status solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget, core::Work& work) noexcept;
+  Status solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
+               core::Work& work) noexcept;
 
   /// Metres of known way, after solve(); +inf where it did not come.
   [[nodiscard]] double to_goal_m(const Vector3& p_W) const noexcept;
   /// The way from a place: corners in known space one after the other, no farther than `within_m` from it, the last one
   /// where unknown space begins or the goal itself. Returns how many were written.
-  [[nodiscard]] std::size_t known_way(const Vector3& from_W, double within_m, std::span<Vector3> way_W) const noexcept;
+  [[nodiscard]] std::size_t known_way(const Vector3& from_W, double within_m,
+                                      std::span<Vector3> way_W) const noexcept;
 
  private:
   struct Cell {
@@ -97,7 +99,8 @@ class WayMemory {
     return {p % size_.x, (p / size_.x) % size_.y, p / (size_.x * size_.y)};
   }
   [[nodiscard]] bool has(const Cell& block) const noexcept {
-    return block.x >= 0 && block.y >= 0 && block.z >= 0 && block.x < size_.x && block.y < size_.y && block.z < size_.z;
+    return block.x >= 0 && block.y >= 0 && block.z >= 0 && block.x < size_.x && block.y < size_.y &&
+           block.z < size_.z;
   }
   [[nodiscard]] Cell place_of(const Vector3& p_W) const noexcept;
   [[nodiscard]] Vector3 at_W(const Cell& place) const noexcept;
@@ -106,10 +109,11 @@ class WayMemory {
   [[nodiscard]] bool nearest_room(const Vector3& p_W, Cell& place) const noexcept;
   [[nodiscard]] std::uint32_t node_of(std::uint32_t position, unsigned room) const noexcept;
   /// The cells of blocks low .. high, and of one more to the far sides: vehicles reach into it. False: budget spent.
-  [[nodiscard]] bool read_window(const MapView& map, const Cell& low, const Cell& high, core::StageBudget& budget,
-                                 core::Work& work) noexcept;
+  [[nodiscard]] bool read_window(const MapView& map, const Cell& low, const Cell& high,
+                                 core::StageBudget& budget, core::Work& work) noexcept;
   /// A block of the window and the seven that follow it; returns their digest.
-  [[nodiscard]] std::uint64_t cells_at(const Cell& block, const Cell& low, const Cell& high, WayCells& cells) const noexcept;
+  [[nodiscard]] std::uint64_t cells_at(const Cell& block, const Cell& low, const Cell& high,
+                                       WayCells& cells) const noexcept;
   void renew(const Cell& block, const WayCells& cells) noexcept;
   void forbid(const Cell& block, WayPlaces& places) const noexcept;
   /// Of a block that changed, and of its neighbours to it.
@@ -118,12 +122,17 @@ class WayMemory {
   void find_inner_doors(Block& b) noexcept;
   [[nodiscard]] Block* take(std::uint32_t position) noexcept;
   void give_back(std::int32_t block) noexcept;
-  [[nodiscard]] std::int32_t kind_at(std::uint32_t position) const noexcept { return position_[position].kind; }
+  [[nodiscard]] std::int32_t kind_at(std::uint32_t position) const noexcept {
+    return position_[position].kind;
+  }
 
   [[nodiscard]] bool seed(const Vector3& goal_W) noexcept;
+  /// From where the search ends, straight on.
+  [[nodiscard]] bool seed_border(const Vector3& goal_W) noexcept;
   [[nodiscard]] bool is_settled(std::uint32_t node) const noexcept { return node_[node].settled == search_; }
   [[nodiscard]] bool in_search(const Cell& b) const noexcept {
-    return b.x >= low_.x && b.y >= low_.y && b.z >= low_.z && b.x <= high_.x && b.y <= high_.y && b.z <= high_.z;
+    return b.x >= low_.x && b.y >= low_.y && b.z >= low_.z && b.x <= high_.x && b.y <= high_.y &&
+           b.z <= high_.z;
   }
   void reach(std::uint32_t node, std::uint32_t cost, std::uint32_t next, const Cell& entry) noexcept;
   void relax(std::uint32_t node) noexcept;
@@ -135,7 +144,7 @@ class WayMemory {
   void wait_at(const Vector3& p_W) noexcept;
 
   Config config_;
-  int width_;  ///< Of the vehicle, in cells.
+  int width_;      ///< Of the vehicle, in cells.
   Cell corner_{};  ///< First cell of the first block, in cells from the world's origin.
   Cell size_{};    ///< Blocks.
   std::span<Position> position_;
@@ -152,9 +161,7 @@ class WayMemory {
   core::PoolRecord& node_pool_;
   std::size_t reached_count_{};
   std::uint32_t search_{0};
-  std::span<std::uint64_t> heap_;
-  core::PoolRecord& heap_pool_;
-  std::size_t heap_count_{};
+  core::LeastFirst reached_;
   bool overflown_{};
   Vector3 looked_from_W_ = Vector3::Constant(1e9);
   Cell seen_low_{0, 0, 0}, seen_high_{-1, -1, -1};  ///< Of all blocks looked at.

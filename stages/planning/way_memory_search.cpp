@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 
 #include "stages/planning/planner.hpp"
@@ -12,7 +11,7 @@ namespace {
 constexpr double kUnit_m = 0.01;  // of costs
 constexpr double kMost_m = 1e5;
 constexpr std::uint32_t kPollEvery = 256;
-constexpr double kWaits = 16.0;  // after so many what is unknown costs twice as much
+constexpr double kWaits = 16.0;          // after so many what is unknown costs twice as much
 constexpr std::uint32_t kBeyond = 3000;  // units of cost that the search runs on beyond the vehicle
 constexpr std::array<std::array<std::int32_t, 3>, 6> kStep{
     {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
@@ -25,21 +24,19 @@ double WayMemory::price(std::uint32_t position, unsigned room) const noexcept {
 
 std::uint32_t WayMemory::step_cost(const Cell& from, const Cell& to, double price) noexcept {
   const double length_m = kFinestCell_m * Vector3(from.x - to.x, from.y - to.y, from.z - to.z).norm();
-  return static_cast<std::uint32_t>(length_m / kUnit_m * price + 0.5);
+  return static_cast<std::uint32_t>(std::lround(length_m / kUnit_m * price));
 }
 
-void WayMemory::reach(std::uint32_t node, std::uint32_t cost, std::uint32_t next, const Cell& entry) noexcept {
+void WayMemory::reach(std::uint32_t node, std::uint32_t cost, std::uint32_t next,
+                      const Cell& entry) noexcept {
   Node& n = node_[node];
   if (is_settled(node) || (n.reached == search_ && cost >= n.cost)) return;
-  if (heap_count_ == heap_.size()) {
+  if (!reached_.push((std::uint64_t{cost} << 32U) | node)) {
     overflown_ = true;
     return;
   }
   if (n.reached != search_) node_pool_.use(++reached_count_);
   n = {cost, next, entry, search_, n.settled};
-  heap_pool_.use(heap_count_ + 1);
-  heap_[heap_count_++] = (std::uint64_t{cost} << 32U) | node;
-  std::push_heap(heap_.begin(), heap_.begin() + static_cast<std::ptrdiff_t>(heap_count_), std::greater<>());
 }
 
 void WayMemory::relax_uniform(std::uint32_t node, const Cell& block, unsigned room) noexcept {
@@ -113,20 +110,20 @@ bool WayMemory::seed(const Vector3& goal_W) noexcept {
     reach(node_of(position_of(block), room_at(goal)), 0, kNowhere, goal);
     return true;
   }
-  // From where the search ends, straight on.
+  return seed_border(goal_W);
+}
+
+bool WayMemory::seed_border(const Vector3& goal_W) noexcept {
+  const auto at_border = [](std::int32_t c, std::int32_t low, std::int32_t high, std::int32_t size) {
+    return (c == low && c > 0) || (c == high && c < size - 1);
+  };
   bool any = false;
   for (std::int32_t z = low_.z; z <= high_.z; ++z) {
     for (std::int32_t y = low_.y; y <= high_.y; ++y) {
-      for (std::int32_t x = low_.x; x <= high_.x; ++x) {
-        const bool border = (x == low_.x && x > 0) || (y == low_.y && y > 0) || (z == low_.z && z > 0) ||
-                            (x == high_.x && x < size_.x - 1) || (y == high_.y && y < size_.y - 1) ||
-                            (z == high_.z && z < size_.z - 1);
-        if (!border) {
-          if (z > low_.z && z < high_.z && y > low_.y && y < high_.y && x > low_.x) x = high_.x - 1;
-          continue;
-        }
+      const bool row = at_border(y, low_.y, high_.y, size_.y) || at_border(z, low_.z, high_.z, size_.z);
+      for (std::int32_t x = low_.x; x <= high_.x; x += row ? 1 : std::max(high_.x - low_.x, 1)) {
         const std::uint32_t position = position_of({x, y, z});
-        if (kind_at(position) != kOpen) continue;
+        if ((!row && !at_border(x, low_.x, high_.x, size_.x)) || kind_at(position) != kOpen) continue;
         const Cell middle{kBlockCells * x + 8, kBlockCells * y + 8, kBlockCells * z + 8};
         const double rest_m = kUnknownWeight * (goal_W - at_W(middle)).norm();
         reach(position, static_cast<std::uint32_t>(std::fmin(rest_m / kUnit_m, 4e8)), kNowhere, middle);
@@ -144,19 +141,19 @@ Status WayMemory::solve(const Vector3& from_W, const Vector3& goal_W, core::Stag
   high_ = {std::min(seen_high_.x + 1, size_.x - 1), std::min(seen_high_.y + 1, size_.y - 1),
            std::min(seen_high_.z + 1, size_.z - 1)};
   ++search_;
-  heap_count_ = 0;
+  reached_.clear();
   reached_count_ = 0;
   overflown_ = false;
   Cell start{};
   if (!nearest_room(from_W, start)) return Status::kStartBlocked;
   if (!is_finite(goal_W) || !(goal_W.cwiseAbs().maxCoeff() < kMost_m)) return Status::kInvalidArgument;
-  const std::uint32_t first = node_of(position_of({start.x >> 4, start.y >> 4, start.z >> 4}), room_at(start));
+  const std::uint32_t first =
+      node_of(position_of({start.x >> 4, start.y >> 4, start.z >> 4}), room_at(start));
   if (!seed(goal_W)) return Status::kGoalBlocked;
   std::uint32_t until = kFar;
-  for (std::uint32_t i = 1; heap_count_ > 0; ++i) {
+  for (std::uint32_t i = 1; !reached_.empty(); ++i) {
     if (i % kPollEvery == 0 && budget.spent(work)) return Status::kBudgetSpent;
-    std::pop_heap(heap_.begin(), heap_.begin() + static_cast<std::ptrdiff_t>(heap_count_), std::greater<>());
-    const std::uint64_t entry = heap_[--heap_count_];
+    const std::uint64_t entry = reached_.pop();
     const auto node = static_cast<std::uint32_t>(entry);
     if (entry >> 32U > until) break;
     if (is_settled(node)) continue;
@@ -180,15 +177,17 @@ double WayMemory::to_goal_m(const Vector3& p_W) const noexcept {
   return kUnit_m * n.cost + (at_W(n.entry) - p_W).norm() * price(position, room);
 }
 
-std::size_t WayMemory::known_way(const Vector3& from_W, double within_m, std::span<Vector3> way_W) const noexcept {
+std::size_t WayMemory::known_way(const Vector3& from_W, double within_m,
+                                 std::span<Vector3> way_W) const noexcept {
   Cell place{};
   if (!nearest_room(from_W, place)) return 0;
   unsigned room = room_at(place);
   std::uint32_t node = node_of(position_of({place.x >> 4, place.y >> 4, place.z >> 4}), room);
   std::size_t count = 0;
   while (count < way_W.size() && is_settled(node)) {
-    const bool known = node < position_.size() ? kind_at(node) == kKnown
-                                           : is_known_room(static_cast<unsigned>((node - position_.size()) % kRooms));
+    const bool known = node < position_.size()
+                           ? kind_at(node) == kKnown
+                           : is_known_room(static_cast<unsigned>((node - position_.size()) % kRooms));
     if (!known) break;
     const Vector3 at = at_W(node_[node].entry);
     if ((at - from_W).norm() > within_m) break;

@@ -13,12 +13,15 @@ namespace roborun::stages {
 /// Rooms 1 .. 7 are known, 8 .. 15 open; 0 is closed. What is more than fits the numbers joins the last one.
 inline constexpr unsigned kFirstOpenRoom = 8;
 inline constexpr unsigned kRooms = 16;
-[[nodiscard]] constexpr bool is_known_room(unsigned room) noexcept { return room > 0 && room < kFirstOpenRoom; }
+[[nodiscard]] constexpr bool is_known_room(unsigned room) noexcept {
+  return room > 0 && room < kFirstOpenRoom;
+}
 
 struct WayRooms {
   std::array<std::uint64_t, 256> number{};  ///< Of place x in row 16 z + y, in bits 4 x and up.
   [[nodiscard]] unsigned at(std::int32_t x, std::int32_t y, std::int32_t z) const noexcept {
-    return static_cast<unsigned>(number[static_cast<std::size_t>(16 * z + y)] >> (4 * x)) & 15U;
+    const std::int32_t row = 16 * z + y;
+    return static_cast<unsigned>(number[static_cast<std::size_t>(row)] >> (4 * x)) & 15U;
   }
 };
 

@@ -9,7 +9,7 @@ namespace roborun {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kDegree = rig_detail::kDegree;
+using core::kDegree;
 
 SensorRig one(const CameraSpec& camera) {
   SensorRig rig;

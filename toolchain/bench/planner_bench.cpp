@@ -238,6 +238,7 @@ int main(int argc, char** argv) {
     fmt::print("{}: {} problems\n{:<16} {:>10} {:>10} {:>10} {:>10} {:>10} {:>8} {:>14}\n", kind.name, set.size(), "",
                "first ms", "p90", "boxes", "50 ms: m", "p90", "solved", "allocations/s");
     std::vector<Outcome> outcomes;
+    outcomes.reserve(set.size());
     Own own;
     for (const Problem& p : set) outcomes.push_back(own.run(p));
     const Row ours = summary("roborun", outcomes);

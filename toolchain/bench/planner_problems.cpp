@@ -89,6 +89,7 @@ Problem trap(std::uint64_t number) {
 
 Problem maze(std::uint64_t number) {
   constexpr int kRooms = 8;
+  constexpr std::size_t kAll = std::size_t{kRooms} * kRooms;
   constexpr double kPitch_m = 6.2;  // corridors of 5.6 m
   const double side_m = kRooms * kPitch_m;
   Problem p = empty(side_m - kPitch_m, 0.5 * side_m, number);
@@ -96,17 +97,20 @@ Problem maze(std::uint64_t number) {
   p.request.goal_W.y() = 0.5 * side_m - 0.5 * kPitch_m;
   // A spanning tree by depth first: a wall wherever it does not go.
   core::CounterRng rng(number, 62);
-  std::array<bool, kRooms * kRooms> seen{};
-  std::array<std::array<bool, 2>, kRooms * kRooms> open{};  // to the next in x, in y
+  std::array<bool, kAll> seen{};
+  std::array<std::array<bool, 2>, kAll> open{};  // to the next in x, in y
   std::vector<int> stack{0};
   seen[0] = true;
   while (!stack.empty()) {
     const int at = stack.back();
     std::vector<int> next;
-    if (at % kRooms > 0 && !seen[static_cast<std::size_t>(at - 1)]) next.push_back(at - 1);
-    if (at % kRooms < kRooms - 1 && !seen[static_cast<std::size_t>(at + 1)]) next.push_back(at + 1);
-    if (at / kRooms > 0 && !seen[static_cast<std::size_t>(at - kRooms)]) next.push_back(at - kRooms);
-    if (at / kRooms < kRooms - 1 && !seen[static_cast<std::size_t>(at + kRooms)]) next.push_back(at + kRooms);
+    const auto look = [&](int to) {
+      if (!seen[static_cast<std::size_t>(to)]) next.push_back(to);
+    };
+    if (at % kRooms > 0) look(at - 1);
+    if (at % kRooms < kRooms - 1) look(at + 1);
+    if (at / kRooms > 0) look(at - kRooms);
+    if (at / kRooms < kRooms - 1) look(at + kRooms);
     if (next.empty()) {
       stack.pop_back();
       continue;
@@ -118,7 +122,8 @@ Problem maze(std::uint64_t number) {
   }
   const double x0 = -0.5 * kPitch_m, y0 = -0.5 * side_m;
   for (int room = 0; room < kRooms * kRooms; ++room) {
-    const double x = x0 + kPitch_m * (room % kRooms + 1), y = y0 + kPitch_m * (room / kRooms + 1);
+    const int column = room % kRooms + 1, row = room / kRooms + 1;
+    const double x = x0 + kPitch_m * column, y = y0 + kPitch_m * row;
     if (!open[static_cast<std::size_t>(room)][0]) box(p, x - 0.3, y - kPitch_m - 0.3, x + 0.3, y + 0.3);
     if (!open[static_cast<std::size_t>(room)][1]) box(p, x - kPitch_m - 0.3, y - 0.3, x + 0.3, y + 0.3);
   }

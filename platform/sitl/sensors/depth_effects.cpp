@@ -47,13 +47,13 @@ DepthEffects::DepthEffects(const CameraSpec& spec, std::uint64_t seed, std::uint
 
   core::CounterRng world(seed, 0x300000U);  // the same sun for all cameras
   const double azimuth_rad = 2.0 * core::kPi * world.uniform();
-  const double level = core::cos(model.sun_elevation_deg * kDegree);
+  const double level = core::cos(model.sun_elevation_deg * core::kDegree);
   sun_W_ = {level * core::cos(azimuth_rad), level * core::sin(azimuth_rad),
-            core::sin(model.sun_elevation_deg * kDegree)};
-  glare_cosine_ = core::cos(model.glare_deg * kDegree);
+            core::sin(model.sun_elevation_deg * core::kDegree)};
+  glare_cosine_ = core::cos(model.glare_deg * core::kDegree);
 
   core::CounterRng mount(seed, 0x310000U + camera);
-  const Vector3 half_rad = 0.5 * model.mount_deg * kDegree * normal3(mount);
+  const Vector3 half_rad = 0.5 * model.mount_deg * core::kDegree * normal3(mount);
   R_CE_ = Quaternion(1.0, half_rad.x(), half_rad.y(), half_rad.z()).normalized().toRotationMatrix();
   p_CE_ = model.mount_m * normal3(mount);
 

@@ -1,13 +1,10 @@
-/// What several sensor models draw and convert.
+/// What several sensor models draw.
 #pragma once
 
-#include "core/geometry/math.hpp"
 #include "core/geometry/vector.hpp"
 #include "core/random/counter_rng.hpp"
 
 namespace roborun::sitl {
-
-inline constexpr double kDegree = core::kPi / 180.0;
 
 /// Three standard normal numbers.
 [[nodiscard]] inline Vector3 normal3(core::CounterRng& rng) noexcept {

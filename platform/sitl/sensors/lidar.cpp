@@ -8,10 +8,10 @@
 #include <sstream>
 
 #include "core/geometry/camera_pose.hpp"
+#include "core/geometry/math.hpp"
 #include "core/random/counter_rng.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
-#include "platform/sitl/sensors/draws.hpp"
 
 namespace roborun::sitl {
 namespace {
@@ -20,9 +20,9 @@ constexpr std::uint64_t kStream = 0x100;  // the cameras' are 0 .. 7
 constexpr std::size_t kMostRays = 65536;
 
 Vector3 direction(const LidarRay& ray) noexcept {
-  const double level = core::cos(ray.elevation_deg * kDegree);
-  return {level * core::cos(ray.azimuth_deg * kDegree), level * core::sin(ray.azimuth_deg * kDegree),
-          core::sin(ray.elevation_deg * kDegree)};
+  const double level = core::cos(ray.elevation_deg * core::kDegree);
+  return {level * core::cos(ray.azimuth_deg * core::kDegree),
+          level * core::sin(ray.azimuth_deg * core::kDegree), core::sin(ray.elevation_deg * core::kDegree)};
 }
 
 }  // namespace

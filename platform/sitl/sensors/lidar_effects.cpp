@@ -31,7 +31,7 @@ LidarEffects::LidarEffects(const LidarErrors& errors, double rain_mmph, std::uin
       speck_ratio_(errors.false_ratio + 1e-4 * rain_mmph),
       lattice_(seed) {
   core::CounterRng mount(seed, 0x320000U + lidar);
-  const Vector3 half_rad = 0.5 * errors.mount_deg * kDegree * normal3(mount);
+  const Vector3 half_rad = 0.5 * errors.mount_deg * core::kDegree * normal3(mount);
   R_LE_ = Quaternion(1.0, half_rad.x(), half_rad.y(), half_rad.z()).normalized().toRotationMatrix();
   p_LE_ = errors.mount_m * normal3(mount);
 }

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
-#include "platform/sitl/sensors/draws.hpp"
 #include "platform/sitl/sensors/exposures.hpp"
 
 namespace roborun::sitl {
@@ -28,7 +27,7 @@ std::array<double, 3> to_array(const Vector3& v) noexcept { return {v.x(), v.y()
 double sky_ratio(const World& world, const Vector3& p_W) noexcept {
   constexpr double kFar_m = 80.0;
   int open = 0;
-  for (const double elevation_rad : {20.0 * kDegree, 50.0 * kDegree}) {
+  for (const double elevation_rad : {20.0 * core::kDegree, 50.0 * core::kDegree}) {
     for (int i = 0; i < 8; ++i) {
       const double azimuth_rad = 0.25 * core::kPi * (i + 0.5), level = core::cos(elevation_rad);
       const Vector3 toward_W(level * core::cos(azimuth_rad), level * core::sin(azimuth_rad),
@@ -50,11 +49,11 @@ NavigationSensors::NavigationSensors(const NavigationSensorsConfig& config, std:
   build_.gyro_misalignment = normal3(made, imu_errors_.misalignment_ratio);
   build_.accel_misalignment = normal3(made, imu_errors_.misalignment_ratio);
   const GnssErrors& g = gnss_errors_;
-  build_.compass_rad = {kDegree * g.compass_bias_deg * made.normal(),
-                        kDegree * g.compass_iron_deg * made.normal(),
-                        kDegree * g.compass_iron_deg * made.normal()};
+  build_.compass_rad = {core::kDegree * g.compass_bias_deg * made.normal(),
+                        core::kDegree * g.compass_iron_deg * made.normal(),
+                        core::kDegree * g.compass_iron_deg * made.normal()};
   for (double& phase_rad : build_.compass_phase_rad) phase_rad = 2.0 * core::kPi * made.uniform();
-  build_.compass_current_rad = kDegree * g.compass_current_deg * made.normal();
+  build_.compass_current_rad = core::kDegree * g.compass_current_deg * made.normal();
   for (Vector3& direction : build_.shake) direction = normal3(made, 1.0).normalized();
   for (double& angle_rad : rotor_rad_) angle_rad = 2.0 * core::kPi * made.uniform();
   // Drift and multipath began long before.
@@ -133,7 +132,7 @@ double NavigationSensors::compass_rad(const VehicleState& state) noexcept {
                           build_.compass_rad[1] * core::sin(heading_rad + build_.compass_phase_rad[0]) +
                           build_.compass_rad[2] * core::sin(2.0 * heading_rad + build_.compass_phase_rad[1]) +
                           build_.compass_current_rad * throttle +
-                          kDegree * (place_deg_ + gnss_errors_.compass_noise_deg * gnss_rng_.normal()));
+                          core::kDegree * (place_deg_ + gnss_errors_.compass_noise_deg * gnss_rng_.normal()));
 }
 
 void NavigationSensors::sample_product_gnss(const VehicleState& state) noexcept {

@@ -71,7 +71,7 @@ class SdfReader {
     if (!frame.empty() && frame != "world" && frame != "__model__")
       xml.refuse(*element, fmt::format("relative_to: '{}' is not read: must be the element it is in", frame));
     const auto p = xml.numbers<6>(*element);
-    const double unit = element->BoolAttribute("degrees", false) ? core::kPi / 180.0 : 1.0;
+    const double unit = element->BoolAttribute("degrees", false) ? core::kDegree : 1.0;
     pose.p_RT = scale_ * Vector3(p[0], p[1], p[2]);
     pose.R_RT =
         (Eigen::AngleAxisd(unit * p[5], Vector3::UnitZ()) * Eigen::AngleAxisd(unit * p[4], Vector3::UnitY()) *

@@ -320,4 +320,28 @@ double World::congestion_ratio(double x_m, double y_m) const noexcept {
   return static_cast<double>(occupied) / cells;
 }
 
+std::string why_no_room(const World& world, double radius_m) {
+  constexpr double kStep_m = 0.1;
+  constexpr double kUneven_m = 0.3;  // of the ground that it stands on
+  const Vector3& start_W = world.start_W();
+  const auto place = [](const Vector3& p_W) {
+    return fmt::format("({:.2f}, {:.2f}, {:.2f})", p_W.x(), p_W.y(), p_W.z());
+  };
+  for (const auto& [name, p_W] : {std::pair{"start", start_W}, std::pair{"goal", world.goal_W()}}) {
+    if (world.clearance_m(p_W, radius_m) < radius_m)
+      return fmt::format("{} {} is closer than {} m to an obstacle: must be free", name, place(p_W),
+                         radius_m);
+  }
+  const double ground_m = world.ground_below_m(start_W);
+  if (!std::isfinite(ground_m))
+    return fmt::format("no ground below the start {}: must have some, or --ground Z", place(start_W));
+  for (Vector3 p_W = start_W; p_W.z() > ground_m + radius_m + kUneven_m; p_W.z() -= kStep_m) {
+    if (world.clearance_m(p_W, radius_m) < radius_m)
+      return fmt::format(
+          "start {}: no room to climb to it from the ground at {:.2f} m: {} m at {:.2f} m must be free",
+          place(start_W), ground_m, radius_m, p_W.z());
+  }
+  return {};
+}
+
 }  // namespace roborun::sitl

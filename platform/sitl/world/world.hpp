@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -128,5 +129,9 @@ class World {
   std::vector<Range> column_;          ///< Objects over each grid square, into object_.
   std::vector<std::uint32_t> object_;  ///< Pillars, boxes, balls, turned: one number after the other.
 };
+
+/// Why a vehicle of this radius cannot fly in it, empty if it can: start and goal must be free, and the start must
+/// have ground below it and, from where the vehicle no longer touches what it stands on, room to climb to it.
+[[nodiscard]] std::string why_no_room(const World& world, double radius_m);
 
 }  // namespace roborun::sitl

@@ -27,7 +27,6 @@ constexpr double kMaxVoxels = 4e9;     // bits: 512 MB
 constexpr double kFarthest_m = 20e3;   // from the origin; what is farther is counted from its lowest corner
 constexpr double kOverGround_m = 0.5;  // from there on is where a vehicle may be
 constexpr double kSide_m = 5.0;        // beside a start or goal outside of what is in the file
-constexpr double kUneven_m = 0.3;      // of the ground around a start
 constexpr double kPillarTop_m = 20.0;
 constexpr std::array<WorldKey, 10> kKeys{
     {{"world",
@@ -332,35 +331,7 @@ WorldDescription read_world(const std::string& path, Kind kind, const std::vecto
 void check_options(const std::string& path, Kind kind, const WorldOptions& options) {
   const bool cloud = kind == Kind::kPcd || kind == Kind::kPly || kind == Kind::kLas;
   if (options.cell_m && !cloud) refuse(path, "--cell goes with point clouds: .pcd, .ply, .las");
-  if (!(options.scale >= 1e-6 && options.scale <= 1e6))
-    throw InputError(fmt::format("--scale: {} must be from 1e-6 to 1e6", options.scale));
   if (kind == Kind::kToml && options.scale != 1.0) refuse(path, "--scale does not go with .toml");
-}
-
-/// Start and goal must be free, and the start must have ground below it and room to climb to it.
-void check_ends(const std::string& path, const World& world, double radius_m) {
-  const auto place = [](const Vector3& p_W) {
-    return fmt::format("({:.2f}, {:.2f}, {:.2f})", p_W.x(), p_W.y(), p_W.z());
-  };
-  for (const auto& [name, p_W] : {std::pair{"start", world.start_W()}, std::pair{"goal", world.goal_W()}}) {
-    if (world.clearance_m(p_W, radius_m) < radius_m)
-      refuse(path, fmt::format("{} {} is closer than {} m to an obstacle: must be free", name, place(p_W),
-                               radius_m));
-  }
-  const double ground_m = world.ground_below_m(world.start_W());
-  if (!std::isfinite(ground_m))
-    refuse(path, fmt::format("no ground below the start {}: must have some, or --ground Z",
-                             place(world.start_W())));
-  constexpr double kStep_m = 0.1;
-  Vector3 p_W = world.start_W();
-  for (; p_W.z() > ground_m + radius_m + kUneven_m; p_W.z() -= kStep_m) {
-    if (world.clearance_m(p_W, radius_m) < radius_m)
-      refuse(
-          path,
-          fmt::format(
-              "start {}: no room to climb to it from the ground at {:.2f} m: {} m at {:.2f} m must be free",
-              place(world.start_W()), ground_m, radius_m, p_W.z()));
-  }
 }
 
 }  // namespace
@@ -404,7 +375,7 @@ World load_world(const std::string& path, const WorldOptions& options) {
   if (options.start_W) read.start_W = *options.start_W;
   if (options.goal_W) read.goal_W = *options.goal_W;
   World world(std::move(read));
-  check_ends(path, world, options.radius_m);
+  if (const std::string why = why_no_room(world, options.radius_m); !why.empty()) refuse(path, why);
   return world;
 }
 

@@ -22,7 +22,7 @@ struct WorldOptions {
   std::optional<Aabb> bounds_W{};    ///< Where the vehicle's centre may be.
   std::optional<double> ground_m{};  ///< Height of the plane that is the ground.
   std::optional<double> cell_m{};    ///< Of point clouds; none: kCloudCell_m.
-  double scale{1.0};                 ///< All lengths of the file times this; not of TOML.
+  double scale{1.0};                 ///< All lengths of the file times this, 1e-6 to 1e6; not of TOML.
   bool surfaces{false};              ///< Meshes need not be closed.
   double radius_m{0.6};              ///< Start and goal must be free for a sphere of this size.
 };

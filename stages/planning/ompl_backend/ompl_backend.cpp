@@ -21,6 +21,10 @@ namespace og = ompl::geometric;
 constexpr std::uint_fast32_t kSeed = 20210;
 constexpr double kExplored_m3 = 4.8 * 4.8 * 4.8;  // of each node, as in the own planner's volume monitor
 
+bool is_over(const PlanRequest& request, core::StageBudget& budget, const core::Work& work) noexcept {
+  return work.volume_m3 >= request.volume_m3 || budget.spent(work);
+}
+
 class OmplPlanner final : public Planner {
  public:
   OmplPlanner(std::string name, const OmplConfig& config) : name_(std::move(name)), config_(config) {}
@@ -66,7 +70,7 @@ class OmplPlanner final : public Planner {
     bool spent = false;
     const ob::PlannerTerminationCondition stop([&] {
       work.volume_m3 = 0.1 * kExplored_m3 * checks;
-      spent = work.volume_m3 >= request.volume_m3 || budget.spent(work);
+      spent = is_over(request, budget, work);
       return spent || ++checks > config_.max_iterations ||
              (problem->hasExactSolution() && checks > config_.max_iterations / 4);
     });

@@ -45,12 +45,15 @@ refuses "cannot be loaded" calibrate --repeats 1 --planner plugin:nope.so
 refuses "must go with --host-file" fly --profile host --planner plugin:nope.so
 refuses "must be those that ship" sweep --planner plugin:nope.so --out /tmp/roborun_cli_test_sweep.$$
 refuses "must be own or ompl:NAME" fly --planner ompl:Foo
-refuses "deadline or all" fly --plot x.svg --color red
+refuses "deadline, all or known" fly --plot x.svg --color red
 refuses "package_delivery or search_and_rescue" fly --mission x
 refuses "cannot be opened" fly --world nope.toml
 refuses "must end in .toml, .bt or .ot" fly --world nope.xyz
 refuses "cannot be opened" world check nope.sdf
-refuses "must be from 0 to 2" world check "$data/worlds/two_pillars.toml" --margin -1
+refuses "--margin: '-1' is out of range: must be a number from 0 to 2" world check "$data/worlds/two_pillars.toml" --margin -1
+refuses "--margin: 'nan' is out of range: must be a number from 0 to 2" world check "$data/worlds/two_pillars.toml" --margin nan
+refuses "--scale: '0' is out of range: must be a number from 1e-06 to 1000000" world check nope.pcd --scale 0
+refuses "--scale: '2x' is out of range: must be a number from" fly --world nope.pcd --scale 2x
 refuses "must be from 0.01 to 5" world check "$data/worlds/two_pillars.toml" --resolution 1e-9
 refuses "cannot be written" world check "$data/worlds/two_pillars.toml" --plot /nonexistent/x.svg
 refuses "outside the bounds" world check "$data/worlds/two_pillars.toml" --start 900,0,3

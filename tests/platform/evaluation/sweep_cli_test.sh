@@ -2,7 +2,7 @@
 # roborun sweep: bad input gets one line and exit code 2 and leaves no folder; after Ctrl-C and after kill -9 the same
 # command goes on, and ends with the bytes of a run that was never stopped; --json ends with one JSON object.
 set -u
-roborun=$1
+roborun=$(realpath "$1") || exit 1
 folder=$(mktemp -d "${TMPDIR:-/tmp}/roborun_sweep_cli.XXXXXX") || exit 1
 trap 'rm -rf "$folder"' EXIT
 failed=0
@@ -25,7 +25,7 @@ refuses() {
     passed=$((passed + 1))
   fi
 }
-refuses "must be paper27" --suite x
+refuses "must be paper27, hard or foreign" --suite x
 refuses "1 .. 27" --environments 28
 refuses "1 .. 27" --environments 1,,2
 refuses "given twice" --environments 1,1
@@ -47,6 +47,16 @@ refuses "1 <= I <= N" --shard 0/4
 refuses "1 <= I <= N" --shard 5/4
 refuses "1 <= I <= N" --shard 2
 refuses "--nope" --nope
+refuses "unknown world 'nope' of suite hard: must be maze, trap" --suite hard --environments nope
+refuses "--worlds: must be the folder" --suite foreign
+refuses "--worlds: must be the folder" --suite hard --worlds "$folder"
+refuses "has no eth_forest0.bt, eth_start_and_end.csv" --suite foreign --worlds "$folder" --environments eth-0
+refuses "must be one: several go with" --vehicle paper,micro
+refuses "--mission: goes with --suite paper27" --suite hard --mission search_and_rescue
+refuses "racer has no camera" --suite hard --vehicle racer-six
+mkdir "$folder/damaged" && echo "<sdf" >"$folder/damaged/mighty_easy_forest.world"
+made=$("$roborun" sweep --suite foreign --worlds "$folder/damaged" --environments mighty-easy --profile paper --out "$folder/bad" 2>&1)
+check "a damaged file is named" test $? -eq 2 -a "${made/mighty_easy_forest.world/}" != "$made"
 refuses "required" merge
 refuses "cannot be opened" merge /nonexistent
 
@@ -111,5 +121,39 @@ BOARD
   --out "$folder/boards" --json >"$folder/json" 2>/dev/null
 check "a board file is a profile" grep -q '"profiles":{"paper":{"aware":.*},"board":{"aware":{"missions":1,' "$folder/json"
 check "each profile has its picture" test -s "$folder/boards/sensitivity_board.svg"
+
+# Suites of worlds. The command of each failed flight flies the same flight.
+suite() { "$roborun" sweep --profile paper --settings "$folder/short.toml" --jobs 2 "$@" 2>/dev/null; }
+suite --suite hard --environments gaps,closed-maze --vehicle paper --seeds 3,4 --out "$folder/hard" --json >"$folder/json"
+for wanted in '"suite":"hard","complete":true' '"world":"gaps","vehicle":"paper"' '"seeds":[3,4],"flights":2,"possible":2,"reached":0' \
+  '"world":"closed-maze"' '"flights":2,"possible":0' '"reason":"time_limit"'; do
+  check "the suite's JSON has $wanted" grep -qF -- "$wanted" "$folder/json"
+done
+check "the suite's table has its seeds" grep -qE '^gaps +paper +paper +2 +2 +0 +0 +0 .* 3-4$' "$folder/hard/tables.txt"
+command=$(grep -o 'roborun world make gaps --seed 3 .*--settings FILE' "$folder/hard/tables.txt" | head -1)
+check "a failed flight has a command" test -n "$command"
+hash_of() { grep -o '"state_hash":"[0-9a-f]*"'; }
+again=$(cd "$folder" && bash -c "roborun() { '$roborun' \"\$@\"; }; ${command/FILE/short.toml} --json" 2>/dev/null | hash_of)
+check "that flies the same flight" test -n "$again" -a "$again" = "$(sed -n 1p "$folder/hard/results.jsonl" | hash_of)"
+mkdir "$folder/worlds"
+cat >"$folder/worlds/mighty_easy_forest.world" <<'WORLD'
+<sdf version="1.6"><world name="w"><model name="tree"><static>1</static><pose>40 0 3 0 0 0</pose><link name="l">
+<collision name="c"><geometry><cylinder><radius>1</radius><length>6</length></cylinder></geometry></collision></link></model>
+<model name="ground"><static>1</static><link name="l"><collision name="c"><geometry><plane><normal>0 0 1</normal>
+<size>400 400</size></plane></geometry></collision></link></model></world></sdf>
+WORLD
+suite --suite foreign --worlds "$folder/worlds" --environments mighty-easy --out "$folder/foreign" >"$folder/table"
+check "a foreign world is possible" grep -qE '^mighty-easy +mighty-six +paper +1 +1 +0 +0 ' "$folder/table"
+command=$(grep -o "roborun fly --world $folder/worlds/mighty_easy.*--settings FILE" "$folder/table")
+again=$(bash -c "roborun() { '$roborun' \"\$@\"; }; ${command/FILE/$folder/short.toml} --json" 2>/dev/null | hash_of)
+check "its command flies the same flight" test -n "$again" -a "$again" = "$(hash_of <"$folder/foreign/results.jsonl")"
+"$roborun" sweep --suite hard --environments closed-forest --vehicle paper --profile paper --seeds 1 --jobs 2 --out "$folder/closed" \
+  --json >"$folder/json" 2>/dev/null
+check "a closed world is proven to be one" grep -qF '"flights":1,"possible":0,"reached":0,"collided":0,"no_way":1' "$folder/json"
+for shard in 1 2; do
+  suite --suite hard --environments gaps,closed-maze --vehicle paper --seeds 3,4 --shard $shard/2 --out "$folder/s$shard" >/dev/null
+done
+"$roborun" sweep merge "$folder/s1" "$folder/s2" --out "$folder/hard2" >/dev/null
+check "shards of a suite merge to the same bytes" diff -r "$folder/hard" "$folder/hard2"
 echo "$passed passed, $failed failed"
-[[ $failed -eq 0 && $passed -ge 45 ]]
+[[ $failed -eq 0 && $passed -ge 66 ]]

@@ -22,7 +22,7 @@ SweepPlan small_plan() {
   SweepPlan plan;
   plan.commit = "c0ffee";
   plan.build = "0123456789abcdef";
-  plan.environments = {1, 14};
+  plan.environments = {"1", "14"};
   plan.profiles = {{"paper", "0"}};
   plan.designs = {"aware", "static"};
   plan.seeds = {1, 2};
@@ -32,7 +32,7 @@ SweepPlan small_plan() {
 SweepInputs small_inputs() {
   SweepInputs inputs;
   inputs.profile["paper"] = board::paper();
-  inputs.base.judge.time_limit_s = 8.0;
+  inputs.base[""].judge.time_limit_s = 8.0;
   return inputs;
 }
 
@@ -87,7 +87,7 @@ TEST(Sweep, HasTheSameBytesWithOneJobWithTwoAndFromShards) {
 
 TEST(Sweep, GoesOnWhereItWasCutOffAtAnyByte) {
   SweepPlan plan = small_plan();
-  plan.environments = {1};
+  plan.environments = {"1"};
   const std::string folder = sweep_into("cut", plan, 2);
   const std::string results = folder + "/results.jsonl";
   const auto whole = files_of(folder);
@@ -108,7 +108,7 @@ TEST(Sweep, GoesOnWhereItWasCutOffAtAnyByte) {
 
 TEST(Sweep, FliesNothingTwice) {
   SweepPlan plan = small_plan();
-  plan.environments = {1};
+  plan.environments = {"1"};
   const std::string folder = sweep_into("again", plan, 2);
   SweepInputs none;  // without a profile no mission could fly
   SweepStore store(folder, plan);

@@ -75,8 +75,27 @@ TEST(OutputFile, AKilledWriterLeavesTheFileBefore) {
   }
   ASSERT_EQ(waitpid(child, nullptr, 0), child);
   EXPECT_EQ(content(path), "before");
-  write_file(path, "after");  // the dead one's part is in nobody's way
+  const fs::path in = fs::path(path).parent_path();
+  EXPECT_EQ(files_in(in), 2U);
+  for (const char* name :
+       {"map.bt.notes.part", "map.bt.1.part.txt", "map.bt2.1.part", "map.bt.1-.part", "map.bt.part"})
+    write_file(in / name, "somebody's");
+  write_file(path, "after");
   EXPECT_EQ(content(path), "after");
+  EXPECT_EQ(files_in(in), 6U) << "the dead one's part is gone, and nothing else";
+}
+
+TEST(OutputFile, TwoWritersOfOneNameDoNotTakeEachOthersParts) {
+  const fs::path in = folder("two");
+  const std::string path = in / "x";
+  OutputFile first(path);
+  first.write("first");
+  write_file(path, "second");
+  EXPECT_EQ(content(path), "second");
+  EXPECT_EQ(files_in(in), 2U);
+  first.commit();
+  EXPECT_EQ(content(path), "first");
+  EXPECT_EQ(files_in(in), 1U);
 }
 
 TEST(OutputFile, KeepsThePermissionsOfTheFileBefore) {
@@ -116,6 +135,7 @@ TEST(OutputFile, WritesThroughWhatIsNoRegularFile) {
 
 TEST(OutputFile, StandardOutputGoesOnWhereItWas) {
   const std::string path = folder("stdout") / "out.txt";
+  (void)std::fflush(stdout);  // or the child would print it again
   const pid_t child = fork();
   if (child == 0) {
     const int fd = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "platform/board/board_profile.hpp"
+#include "platform/input/input_error.hpp"
 #include "platform/mission/mission.hpp"
 #include "platform/sitl/world/octomap_file.hpp"
 #include "platform/sitl/world/world_file.hpp"
@@ -96,6 +97,26 @@ TEST(Ground, AHillOfTrianglesFlies) {
   EXPECT_EQ(report.result.reason, "reached_goal");
   EXPECT_FALSE(report.result.collided);
   EXPECT_NEAR(report.path.front().p_WB.z(), 5.0, 0.1);
+}
+
+TEST(Ground, AStartWithoutAnyIsRefused) {
+  sitl::WorldDescription d = upper_floor();
+  d.ground_m = -std::numeric_limits<double>::infinity();
+  d.boxes[0].min_W.x() = 5.0;  // not under the start
+  try {
+    (void)flight_config_of(sitl::World(d), paper_mission());
+    FAIL() << "a vehicle that stands nowhere";
+  } catch (const InputError& refusal) {
+    EXPECT_EQ(std::string(refusal.what()).find("no ground below the start (0.00, 0.00, 6.50)"), 0U)
+        << refusal.what();
+  }
+}
+
+TEST(Ground, APlateBesideTheClimbIsFoundHoweverThin) {
+  sitl::WorldDescription d = upper_floor();
+  EXPECT_NO_THROW((void)flight_config_of(sitl::World(d), paper_mission()));
+  d.boxes.push_back({{0.59, -1.0, 5.19}, {0.9, 1.0, 5.2}});  // the vehicle's radius is 0.6 m
+  EXPECT_THROW((void)flight_config_of(sitl::World(d), paper_mission()), InputError);
 }
 
 TEST(Ground, AWallBesideTheStartIsACollisionWhileItClimbs) {

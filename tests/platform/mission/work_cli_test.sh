@@ -20,9 +20,12 @@ flies() {
     failed=$((failed + 1))
   fi
 }
+json_says() { grep -q "\"believed\":$1}" "$work/out" || { echo "FAILED --json does not say believed: $1: $(cat "$work/out")"; failed=$((failed + 1)); }; }
 flies 0 ""
+json_says true
 flies 0 "this machine is not measured" --planner "plugin:$plugins/honest_plugin.so"
 flies 1 "planner (plugin:.*): took .* must be at least 1/5 of it; the flight does not count" --planner "plugin:$plugins/lying_plugin.so"
+json_says false
 flies 2 "silent_plugin.so: planned a path, and said that it did no work for which the profile paper charges" \
   --planner "plugin:$plugins/silent_plugin.so"
 [[ -s $work/out ]] && { echo "FAILED a flight that is refused prints a result"; failed=$((failed + 1)); }

@@ -321,6 +321,7 @@ TEST(Verdict, FailsByEachFigureByName) {
   const std::vector<Case> cases{
       {"missing", [](AuditReport& r) { r.missing = {"memory lock: no"}; }},
       {"stopped", [](AuditReport& r) { r.stopped_by = "track"; }},
+      {"stopped", [](AuditReport& r) { r.interrupted = true; }},
       {"heap_calls", [](AuditReport& r) { r.heap_calls_after_start = 1; }},
       {"heap_calls", [](AuditReport& r) { r.heap_sealed = false; }},
       {"decisions_late", [](AuditReport& r) { r.decisions_too_late = 1; }},
@@ -490,9 +491,9 @@ TEST(CompareAudits, OneHeapCallInOneRunIsARegressionWhateverTheNoise) {
 }
 
 TEST(CompareAudits, RefusesOtherFlightsAndMixedSidesAndNamesTheDifference) {
-  for (const char* key : {"rate_Hz", "asked_seconds", "environment", "seed", "profile", "profile_digest",
-                          "vehicle", "vehicle_digest", "settings", "settings_digest", "load", "bus",
-                          "kill_lines", "injected", "real_time"}) {
+  for (const char* key : {"rate_Hz", "asked_seconds", "interrupted", "environment", "seed", "profile",
+                          "profile_digest", "vehicle", "vehicle_digest", "settings", "settings_digest",
+                          "load", "bus", "kill_lines", "injected", "real_time"}) {
     AuditReport other = sample();
     std::erase_if(other.identity, [key](const auto& pair) { return pair.first == key; });
     other.identity.emplace_back(key, "other");

@@ -34,6 +34,7 @@ TEST(ResultLine, ReadsBackWhatItWroteWithoutTheWallTime) {
   result.real_time_factor = 35.0;
   const std::string line = to_line(result);
   EXPECT_EQ(line.find("real_time_factor"), std::string::npos);
+  EXPECT_EQ(line.find("believed"), std::string::npos);
   EXPECT_EQ(line.find('\n'), std::string::npos);
   const auto back = from_line(line);
   ASSERT_TRUE(back.has_value());

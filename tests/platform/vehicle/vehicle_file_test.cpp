@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <string>
 
 #include "platform/input/input_error.hpp"
@@ -27,13 +29,36 @@ std::string refusal(const std::string& text) {
 }
 
 TEST(VehicleFile, EveryShippedVehicleReadsAndCanFly) {
-  ASSERT_EQ(shipped_vehicles().size(), 5U);
+  ASSERT_EQ(shipped_vehicles().size(), 7U);
   EXPECT_EQ(shipped_vehicles().front(), "paper");
   for (const std::string& name : shipped_vehicles()) {
     const Vehicle v = load_vehicle(name);
     EXPECT_EQ(v.name, name);
     EXPECT_EQ(v.digest.size(), 16U);
   }
+}
+
+TEST(VehicleFile, WithSixItSeesAllRoundAsFarAsItsFirstCamera) {
+  const Vehicle one = load_vehicle("micro");
+  const Vehicle six = load_vehicle("micro-six");
+  ASSERT_EQ(one.rig.cameras.size(), 1U);
+  ASSERT_EQ(six.rig.cameras.size(), 6U);
+  EXPECT_NE(six.digest, one.digest);
+  EXPECT_EQ(six.model.radius_m, one.model.radius_m);
+  std::array<std::array<int, 2>, 3> looked{};  // along each axis of the body, back and forth
+  for (const CameraSpec& camera : six.rig.cameras) {
+    EXPECT_EQ(camera.range_m, one.rig.cameras[0].range_m);
+    EXPECT_EQ(camera.tan_half_width, 1.0);
+    const auto R_BC = camera_mount(camera.mount).R_BC;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double along = R_BC[3 * i];  // the first column: where it looks
+      if (std::abs(along) > 0.5) looked[i][along > 0.0 ? 1 : 0] += 1;
+    }
+  }
+  for (const auto& axis : looked) EXPECT_EQ(axis, (std::array<int, 2>{1, 1}));
+  EXPECT_TRUE(ships("paper-six"));
+  EXPECT_FALSE(ships("mine-six"));
+  EXPECT_THROW((void)load_vehicle("racer-six"), InputError);
 }
 
 constexpr const char* kCamera = R"(

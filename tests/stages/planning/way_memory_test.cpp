@@ -139,11 +139,12 @@ TEST_F(WayMemoryTest, AGoalInsideAnObstacleIsAnswered) {
 }
 
 TEST_F(WayMemoryTest, NotFiniteIsRefused) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   make();
-  EXPECT_EQ(sut_->look(view_, Vector3(NAN, 0, 0), 10.0, unlimited_, work_), Status::kInvalidArgument);
+  EXPECT_EQ(sut_->look(view_, Vector3(kNaN, 0, 0), 10.0, unlimited_, work_), Status::kInvalidArgument);
   ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
-  EXPECT_EQ(sut_->solve(Vector3(NAN, 0, 0), goal_W_, unlimited_, work_), Status::kStartBlocked);
-  EXPECT_EQ(sut_->to_goal_m(Vector3(NAN, 0, 0)), kInfinity);
+  EXPECT_EQ(sut_->solve(Vector3(kNaN, 0, 0), goal_W_, unlimited_, work_), Status::kStartBlocked);
+  EXPECT_EQ(sut_->to_goal_m(Vector3(kNaN, 0, 0)), kInfinity);
 }
 
 TEST_F(WayMemoryTest, EndsWithItsBudget) {

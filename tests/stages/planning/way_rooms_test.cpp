@@ -17,7 +17,9 @@ struct Scene {
     const double unknown = rng.uniform(0.0, 0.03), occupied = rng.uniform(0.0, 0.02);
     for (std::size_t i = 0; i < 8; ++i) {
       const double kind = rng.uniform();
-      cells.content[i] = kind < 0.15 ? BlockContent::kFree : kind < 0.25 ? BlockContent::kUnknown : BlockContent::kMixed;
+      cells.content[i] = kind < 0.15   ? BlockContent::kFree
+                         : kind < 0.25 ? BlockContent::kUnknown
+                                       : BlockContent::kMixed;
       cells.block[i] = &block[i];
       for (std::size_t row = 0; row < 256; ++row) {
         for (unsigned x = 0; x < 16; ++x) {
@@ -72,7 +74,7 @@ TEST(WayRooms, AreTheConnectedPlacesOfOneKind) {
     // Neighbours of one kind are in one room, unless the numbers ran out; each kind has its numbers.
     for (std::int32_t i = 0; i < 4096; ++i) {
       const std::int32_t x = i % 16, y = i / 16 % 16, z = i / 256;
-      const auto row = static_cast<std::size_t>(16 * z + y);
+      const std::size_t row = static_cast<std::size_t>(i) / 16;
       const bool known = ((places.known[row] >> x) & 1) != 0, open = ((places.open[row] >> x) & 1) != 0;
       const unsigned room = rooms.at(x, y, z);
       ASSERT_EQ(is_known_room(room), known);
@@ -100,11 +102,12 @@ TEST(WayRooms, AreTheConnectedPlacesOfOneKind) {
         ++reached;
         const auto visit = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
           if (((x | y | z) & ~15) != 0 || rooms.at(x, y, z) != room) return;
-          const auto n = static_cast<std::size_t>(x + 16 * y + 256 * z);
-          if (!seen[n]) seen[n] = true, stack.push_back(static_cast<std::int32_t>(n));
+          const std::int32_t n = x + 16 * y + 256 * z;
+          if (auto&& met = seen[static_cast<std::size_t>(n)]; !met) met = true, stack.push_back(n);
         };
         const std::int32_t x = i % 16, y = i / 16 % 16, z = i / 256;
-        visit(x + 1, y, z), visit(x - 1, y, z), visit(x, y + 1, z), visit(x, y - 1, z), visit(x, y, z + 1), visit(x, y, z - 1);
+        visit(x + 1, y, z), visit(x - 1, y, z), visit(x, y + 1, z), visit(x, y - 1, z), visit(x, y, z + 1),
+            visit(x, y, z - 1);
       }
       EXPECT_EQ(reached, all) << "room " << room << " of seed " << seed;
     }

@@ -16,7 +16,7 @@ mkdir -p "$reports/2026-01-01" "$tree/sweep" "$tree/stock" "$tree/build/release"
 cp "$1/platform/sitl/reports/make_report" "$reports/"
 echo "of the first of January" >"$reports/2026-01-01/README.md"
 for folder in sweep stock; do
-  echo '{"commit": "c0ffee", "suite": "paper27", "environments": [1], "profiles": [{"name": "paper"}], "designs": ["aware"],
+  echo '{"commit": "c0ffee", "suite": "paper27", "environments": ["1"], "profiles": [{"name": "paper"}], "designs": ["aware"],
     "seeds": [1], "map": "own", "planner": "own", "settings": ""}' >"$tree/$folder/request.json"
   echo "a table" >"$tree/$folder/tables.txt"
   echo "{}" >"$tree/$folder/results.jsonl"
@@ -28,7 +28,7 @@ if [[ $1 == --version ]]; then echo "roborun 0.1.0, commit c0ffee"; exit; fi
 if [[ $1 == sweep ]]; then printf 'kernels of %s\nhost: awareness, own     1        1.71     1.65\n' "${*:3}"; exit; fi
 if [[ -e ${0%/*}/breaks ]]; then exit 3; fi
 while [[ $# -gt 0 ]]; do
-  if [[ $1 == --plot ]]; then echo "<svg/>" >"$2"; fi
+  if [[ $1 == --plot || $1 == --out ]]; then echo "<svg/>" >"$2"; fi
   if [[ $1 == --json ]]; then
     echo '{"design": "aware", "reached_goal": true, "mission_time_s": 9, "mean_velocity_mps": 2, "energy_kJ": 3, "latency_s": {"median": 1}}'
   fi
@@ -69,6 +69,23 @@ check "a whole one takes its place" grep -q "Flown by commit .c0ffee." "$reports
 for part in "a table" "aware        8 of 8" "kernels of stock" "^1.71 times as fast as .static-fair." "!\[Sensitivity\](sensitivity.svg)" "--environments 1"; do
   check "it has: $part" grep -q -e "$part" "$reports/2026-01-01/README.md"
 done
+
+# Who arrives: of the suites of worlds, all of one kind.
+cp -r "$tree/sweep" "$tree/hard"
+sed -i 's/paper27/hard/; s/"environments": \["1"\]/"environments": ["maze\/paper", "maze\/micro-six"]/' "$tree/hard/request.json"
+printf 'a row\nfailed: maze\n  roborun world make maze\n' >"$tree/hard/tables.txt"
+before=$(state)
+refuses "must be all of paper27, or all of the suites" 2026-01-01 sweep hard
+refuses "must be all of paper27, or all of the suites" 2026-01-01 hard sweep
+(cd "$tree" && "$reports/make_report" 2026-01-02-arriving hard hard >/dev/null) || failed=1
+arriving=$reports/2026-01-02-arriving
+for part in "flown in simulation by commit .c0ffee." "a row" "failed: maze" "--environments maze --vehicle paper,micro-six --out hard"; do
+  check "it has: $part" grep -q -e "$part" "$arriving/README.md"
+done
+check "but not the commands" test "$(grep -c 'roborun world make' "$arriving/README.md")" -eq 0
+for file in maze.svg results_1.jsonl.gz results_2.jsonl.gz request_2.json; do check "$file" test -s "$arriving/$file"; done
+check "no world is left" test ! -e "$arriving/maze.toml"
+rm -r "$arriving"
 check "and nothing else is there" test "$(ls -A "$reports" | wc -l)" -eq 2
 echo "$passed passed, $failed failed"
-[[ $failed -eq 0 && $passed -ge 27 ]]
+[[ $failed -eq 0 && $passed -ge 38 ]]

@@ -208,7 +208,6 @@ TEST(ProductGnss, IsWorseBetweenWallsAndGoneWhereThereIsNoSky) {
 }
 
 TEST(ProductGnss, TheCompassIsDisturbedByItsVehicleAndByPlaces) {
-  constexpr double kDegree = core::kPi / 180.0;
   double squares = 0.0;
   int count = 0;
   const auto error_deg = [](std::uint64_t seed, const VehicleState& at) {
@@ -218,7 +217,7 @@ TEST(ProductGnss, TheCompassIsDisturbedByItsVehicleAndByPlaces) {
     double sum_deg = 0.0, n = 0.0;
     for (const auto& fix : fixes(seed, 30, nullptr, at)) {
       if (fix.sequence < 10) continue;
-      sum_deg += core::wrap_angle(fix.heading_rad - heading_rad) / kDegree;
+      sum_deg += core::wrap_angle(fix.heading_rad - heading_rad) / core::kDegree;
       n += 1.0;
     }
     return sum_deg / n;

@@ -441,7 +441,6 @@ TEST_F(ForeignWorld, BadInputIsOneLine) {
        "is outside the bounds"},
       {"a.world", sdf(ball), with([](WorldOptions& o) { o.cell_m = 0.1; }), "--cell goes with point clouds"},
       {"a.pcd", ascii_pcd(hall()), with([](WorldOptions& o) { o.cell_m = 1e-9; }), "--cell"},
-      {"a.pcd", ascii_pcd(hall()), with([](WorldOptions& o) { o.scale = 0.0; }), "--scale"},
       {"a.pcd", ascii_pcd({{1, 1, 1}, {2, 2, 3}, {3, 3, 9}}), ends({1, 3, 4}, {1, 3, 5}),
        "no ground below the start"},
       {"a.pcd", ascii_pcd({{0, 0, 0}, {15e3, 15e3, 15e3}}), ends({1, 3, 4}, {1, 3, 5}),

@@ -1,0 +1,94 @@
+#include "platform/report/known_picture.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "platform/report/scene_drawing.hpp"
+
+namespace roborun::report {
+namespace {
+
+constexpr double kWidth = 830.0;
+constexpr double kLeft = 50.0;
+constexpr double kRight = 20.0;
+constexpr double kMaxPanel = 700.0;
+constexpr const char* kUnseen = "#d3d6da";
+constexpr const char* kFree = "#e8f3ff";
+constexpr const char* kSeen = "#d55e00";  // Okabe and Ito
+
+/// Runs of equal cells in a row are one rectangle.
+void draw_known(Svg& svg, const KnownSlice& known, const Aabb& bounds_W, const Frame& f) {
+  const auto rect = [&](double x_m, double y_m, double width_m, const char* fill) {
+    const double low_x_m = std::max(x_m, bounds_W.min_W.x());
+    const double high_x_m = std::min(x_m + width_m, bounds_W.max_W.x());
+    const double low_y_m = std::max(y_m, bounds_W.min_W.y());
+    const double high_y_m = std::min(y_m + known.cell_m, bounds_W.max_W.y());
+    if (high_x_m <= low_x_m || high_y_m <= low_y_m) return;
+    svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="{}"/>)", f.x(low_x_m),
+            f.y(high_y_m), (high_x_m - low_x_m) * f.scale + 0.2, (high_y_m - low_y_m) * f.scale + 0.2, fill);
+  };
+  for (int row = 0; row < known.rows; ++row) {
+    const auto* cell = known.cell.data() + static_cast<std::ptrdiff_t>(row) * known.columns;
+    for (int begin = 0, end = 0; begin < known.columns; begin = end) {
+      while (end < known.columns && cell[end] == cell[begin]) ++end;
+      if (cell[begin] == KnownSlice::Cell::kUnknown) continue;
+      rect(known.x_m + begin * known.cell_m, known.y_m + row * known.cell_m, (end - begin) * known.cell_m,
+           cell[begin] == KnownSlice::Cell::kFree ? kFree : kSeen);
+    }
+  }
+}
+
+struct Key {
+  const char* fill;
+  const char* text;
+  double width;
+};
+
+}  // namespace
+
+std::string known_svg(const Scene& scene, std::span<const MissionReport> missions) {
+  Svg svg;
+  Scene plain = scene;
+  plain.heat_rows = 0;
+  plain.zone_borders_m.clear();
+  plain.background = kUnseen;
+  const Vector3 size = scene.bounds_W.size();
+  const double scale = std::min((kWidth - kLeft - kRight) / size.x(), kMaxPanel / size.y());
+  const double panel = size.y() * scale;
+  svg.text(kLeft, 26, scene.title, "start", 15, kInk, "bold");
+  const Quantity coloured = quantity(PathColour::kSpeed, missions);
+  draw_legend(svg, coloured, kWidth - kRight, 40);
+  constexpr std::array<Key, 4> kKeys{{{kFree, "known to be free", 140},
+                                      {kSeen, "known to be occupied", 170},
+                                      {kUnseen, "not known", 95},
+                                      {"#3e4c59", "obstacle (the truth)", 0}}};
+  double x = kLeft;
+  for (const Key& key : kKeys) {
+    svg.add(R"(<rect x="{:.1f}" y="80" width="13" height="13" fill="{}" stroke="{}" stroke-width="0.5"/>)", x,
+            key.fill, kSoft);
+    svg.text(x + 19, 91, key.text, "start", 13);
+    x += key.width + 19;
+  }
+  double y = 120;
+  for (const MissionReport& mission : missions) {
+    const MissionResult& r = mission.result;
+    svg.text(kLeft, y,
+             fmt::format("{}: {} in {:.0f} s, {:.0f} m flown, mean {:.2f} m/s; the map is cut {:g} m high",
+                         r.design, outcome(r), r.mission_time_s, r.distance_m, r.mean_velocity_mps,
+                         mission.known.height_m),
+             "start", 13);
+    const Frame f{scene.bounds_W.min_W.x(), scene.bounds_W.max_W.y(), scale, kLeft, y + 10};
+    draw_world(svg, plain, f, panel, [&] { draw_known(svg, mission.known, scene.bounds_W, f); });
+    draw_path(svg, mission, f, coloured);
+    draw_ends(svg, scene, f);
+    y += panel + 56;
+  }
+  return svg.finish(kWidth, y - 20, scene.title,
+                    "Worlds from above: the way flown, coloured by speed, over what the vehicle's map knew "
+                    "to be free, knew to be "
+                    "occupied, and did not know when the flight ended.");
+}
+
+}  // namespace roborun::report
