@@ -3,10 +3,13 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string_view>
+
+#include "core/depth_error.hpp"
 
 namespace roborun {
 
@@ -71,6 +74,14 @@ inline constexpr StereoOptics kOakD{0.075, 441.0, 0.10, 1.0 / 8.0, 95.0};
     default:
       return nullptr;
   }
+}
+/// What is to be expected of a camera of this model; of `clean` that of the defaults of the settings. Of the mount: a good
+/// calibration, and what the vehicle turns in the error of a stamp.
+[[nodiscard]] inline DepthError depth_error(CameraModel model) noexcept {
+  constexpr double kMount_m = 0.003, kMount_rad = 0.0035;
+  if (const StereoOptics* optics = stereo_of(model))
+    return {0.0, std::sqrt(optics->variance_per_m4()), kMount_m, kMount_rad, true};
+  return model == CameraModel::kTof ? DepthError{0.002, 0.0012, kMount_m, kMount_rad, true} : DepthError{};
 }
 
 }  // namespace roborun

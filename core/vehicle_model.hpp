@@ -43,6 +43,7 @@ struct VehicleModel {
   double climb_mps{6.0};
   double descent_mps{6.0};
   double yaw_rate_radps{1.5};
+  double thinnest_m{0.02};  ///< A washing line, a bare cable.
 
   /// Measured, of a vehicle that has been flown; none: derived from the limits.
   std::optional<StoppingModel> measured_stopping{kSitlQuadrotorStopping};
@@ -59,12 +60,13 @@ struct VehicleKey {
   double VehicleModel::*value;
   double low, high;  ///< Both allowed.
   const char* text;
+  bool optional{false};  ///< A file may leave it out.
 };
 
 // clang-format off
-inline constexpr std::array<VehicleKey, 24> kVehicleKeys = [] {
+inline constexpr std::array<VehicleKey, 25> kVehicleKeys = [] {
   using V = VehicleModel;
-  return std::array<VehicleKey, 24>{{
+  return std::array<VehicleKey, 25>{{
     {"body", "radius_m", &V::radius_m, 0.05, 2.0, "of the sphere around everything that must not touch, propellers included"},
     {"body", "tracking_error_m", &V::tracking_error_m, 0.02, 2.0, "largest distance from the reference in flight: added to the radius for planning"},
     {"body", "mass_kg", &V::mass_kg, 0.05, 100.0, "at take-off, load included"},
@@ -89,6 +91,7 @@ inline constexpr std::array<VehicleKey, 24> kVehicleKeys = [] {
     {"limits", "climb_mps", &V::climb_mps, 0.2, 30.0, "fastest climb"},
     {"limits", "descent_mps", &V::descent_mps, 0.2, 30.0, "fastest descent"},
     {"limits", "yaw_rate_radps", &V::yaw_rate_radps, 0.05, 10.0, "fastest turn about the vertical"},
+    {"limits", "thinnest_m", &V::thinnest_m, 0.005, 1.0, "the thinnest pole or wire that it must not fly into", true},
   }};
 }();
 // clang-format on

@@ -23,6 +23,7 @@ stages::BrickMap::Config brick_config(const Aabb& map_bounds_W, const ImageLimit
   config.max_frames = images.frames;
   config.all_around_frames = images.all_around_frames;
   config.vehicle_radius_m = images.vehicle_radius_m;
+  config.thinnest_m = images.thinnest_m;
   if (config.validate() != Status::kOk) {
     throw InputError("map: the world is too large for the map: at most 4 million bricks of 4.8 m");
   }
@@ -64,6 +65,7 @@ bool uses_plugin(const BackendNames& names) noexcept {
 ImageLimits image_limits(const SensorRig& rig, const VehicleModel& vehicle) noexcept {
   ImageLimits limits;
   limits.vehicle_radius_m = vehicle.radius_m;
+  limits.thinnest_m = vehicle.thinnest_m;
   limits.frames = rig.cameras.size();
   limits.all_around_frames = cameras_see_all_around(rig) ? rig.cameras.size() : 0;
   for (const CameraSpec& camera : rig.cameras) {

@@ -17,6 +17,7 @@ struct ImageLimits {
   /// So many images of cameras see all around; 0: there are not enough of them. (BrickMap::Config)
   std::size_t all_around_frames{6};
   double vehicle_radius_m{VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is.
+  double thinnest_m{VehicleModel{}.thinnest_m};      ///< Must not be forgotten once it was seen.
 };
 
 struct PartRequest {

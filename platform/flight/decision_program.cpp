@@ -69,6 +69,7 @@ void DecisionProgram::look_through_cameras(const stages::PastStates& past) noexc
     if (cameras_[i]->read(posed.frame) != Status::kOk || past.pose_at(posed.frame.stamp, X_WB) != Status::kOk)
       continue;
     posed.X_WC = core::camera_pose(X_WB, cameras_[i]->mount());
+    posed.error = config_.depth_error[i];
     posed.p_BC_W = posed.X_WC.p_RT - X_WB.p_RT;
     sensor_of_[frames_.size()] = i;
     (void)frames_.push_back(posed);

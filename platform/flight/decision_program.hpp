@@ -26,7 +26,8 @@ class DecisionProgram final : public core::LaneProgram {
     Vector3 goal_W = Vector3::Zero();
     std::uint64_t seed{1};
     core::Fence fence{};
-    Nanos minor_frame{core::kMinorFrame};  ///< Of the flight lane.
+    Nanos minor_frame{core::kMinorFrame};                ///< Of the flight lane.
+    std::array<DepthError, kMostCameras> depth_error{};  ///< FlightConfig::depth_error.
   };
   DecisionProgram(const Config& config, DecisionPipeline& pipeline,
                   std::span<firmware_if::DepthCamera* const> cameras, LaneMail& mail,

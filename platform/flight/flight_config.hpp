@@ -36,6 +36,8 @@ struct FlightConfig {
   bool sees_all_around{true};        ///< The cameras together; false: what is not seen may be anything.
   double level_view_ratio{1.0};      ///< Tangent of the elevation, up and down, that one turn sees.
   GazeConfig gaze{};
+  std::array<DepthError, kMostCameras>
+      depth_error{};  ///< Of each camera: the map keeps this away from what it saw.
   /// Pixels a side of the images that each LiDAR's cloud becomes; 0: there is no such LiDAR.
   std::array<std::uint16_t, kMostLidars> cloud_pixels{};
   governor::Design design{governor::Design::kAware};

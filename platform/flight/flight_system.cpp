@@ -90,6 +90,8 @@ void describe_sensors(const SensorRig& rig, FlightConfig& config) noexcept {
   config.sees_all_around = cameras_see_all_around(rig);
   config.level_view_ratio = level_view_ratio(rig);
   config.gaze.follows = !sees_horizon(rig);
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i)
+    config.depth_error[i] = depth_error(rig.cameras[i].model);
   config.cloud_pixels = {};
   for (std::size_t i = 0; i < rig.lidars.size(); ++i) config.cloud_pixels[i] = cloud_pixels(rig.lidars[i]);
 }
@@ -114,8 +116,8 @@ FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, 
                 ways_ ? &*ways_ : nullptr),
       control_(config.vehicle, seconds(config.minor_frame), gaze_of(config)),
       flight_program_({config.vehicle, config.fence, config.answers}, control_, aircraft, mail_),
-      decision_program_({config.goal_W, config.seed, config.fence, config.minor_frame}, pipeline_, cameras,
-                        mail_, lidars, config.cloud_pixels, arena) {
+      decision_program_({config.goal_W, config.seed, config.fence, config.minor_frame, config.depth_error},
+                        pipeline_, cameras, mail_, lidars, config.cloud_pixels, arena) {
   control_.set_cruise_height(config.cruise_m);
 }
 

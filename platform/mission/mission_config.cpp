@@ -30,6 +30,10 @@ flight::FlightConfig flight_config_of(const sitl::World& world, const MissionCon
     throw InputError(fmt::format("{} {}: {}: must be from {} to {}: {}", fault->sensor, fault->index + 1,
                                  fault->key, fault->low, fault->high, fault->text));
   describe_sensors(rig, flight);
+  const sitl::DepthNoise& noise = config.simulator.camera;
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i)
+    if (rig.cameras[i].model == CameraModel::kClean)
+      flight.depth_error[i] = {noise.noise_m, noise.noise_per_m};
   if (const std::string why = sitl::why_no_room(world, flight.vehicle.radius_m); !why.empty())
     throw InputError(why);
   flight.seed = config.seed;

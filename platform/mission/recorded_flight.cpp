@@ -83,7 +83,8 @@ Vector3 place(const Json& json, const char* key) {
 VehicleModel read_vehicle(const Json& json) {
   VehicleModel vehicle;
   for (const VehicleKey& key : kVehicleKeys)
-    vehicle.*key.value = number(json.at(key.table), key.key, key.low, key.high);
+    if (!key.optional || json.at(key.table).contains(key.key))
+      vehicle.*key.value = number(json.at(key.table), key.key, key.low, key.high);
   vehicle.measured_stopping.reset();
   if (json.contains("stopping")) {
     const Json& stopping = json.at("stopping");
@@ -163,6 +164,8 @@ std::string to_json(const RecordedFlight& recorded) {
   j["minor_frame_ns"] = flight.minor_frame.count();
   j["cameras"] = sensors_json(recorded.sensors.cameras);
   j["lidars"] = sensors_json(recorded.sensors.lidars);
+  for (std::size_t i = 0; i < recorded.sensors.cameras.size(); ++i)
+    j["depth_errors"].push_back({flight.depth_error[i].constant_m, flight.depth_error[i].quadratic_per_m});
   const flight::GazeConfig& gaze = flight.gaze;
   j["gaze"] = {{"yaw_rate_radps", gaze.yaw_rate_radps}, {"stuck_s", gaze.stuck_s}, {"lead_s", gaze.lead_s}};
   if (std::isfinite(recorded.slow_down.at_s)) {
@@ -204,6 +207,10 @@ RecordedFlight recorded_flight_from(std::span<const std::byte> json) {
   if (const auto fault = first_fault(recorded.sensors))
     throw InputError(fmt::format("{} {}: {}: {}", fault->sensor, fault->index, fault->key, fault->text));
   describe_sensors(recorded.sensors, flight);
+  for (std::size_t i = 0; j.contains("depth_errors") && i < recorded.sensors.cameras.size(); ++i) {
+    flight.depth_error[i].constant_m = j.at("depth_errors").at(i).at(0).get<double>();
+    flight.depth_error[i].quadratic_per_m = j.at("depth_errors").at(i).at(1).get<double>();
+  }
   const Json& gaze = j.at("gaze");
   flight.gaze.yaw_rate_radps = number(gaze, "yaw_rate_radps", 0.01, 3);
   flight.gaze.stuck_s = number(gaze, "stuck_s", 0, 1e6);

@@ -34,23 +34,38 @@ struct Lanes {
 template <class Bits>
 struct Marks {
   Bits free{0}, mixed{0}, blocked{0}, covered{0};
+  Bits in_part{0};  ///< Free, but many of the pixels are in a hole.
+  Bits whole{0};    ///< Covered by a camera that has not marked it so.
+  Bits sparse{0};   ///< Too many of a camera's pixels are; a part of the block may be free.
+  Bits unseen{0};   ///< The same, or all of them are.
 };
 
 template <class Bits>
 struct Decision {
-  Bits free, mixed;
+  Bits free, mixed, in_part;  ///< in_part: of the free ones.
 };
 
 /// Seen as free by one camera and as hidden by another that sees all of it: they disagree, and always will.
 template <class Bits>
 HWY_INLINE Decision<Bits> decide(const Marks<Bits>& marks, bool complete) {
-  const Bits covered = complete ? ~Bits{0} : marks.covered;
-  return {marks.free & ~marks.mixed & ~marks.blocked & covered,
-          (marks.mixed | (marks.free & ~covered)) & ~marks.blocked};
+  const Bits covered = marks.covered | (complete ? ~marks.unseen : Bits{0});
+  const Bits free = marks.free & ~marks.mixed & ~marks.blocked & covered;
+  return {free, (marks.mixed | ((marks.free | marks.sparse) & ~covered)) & ~marks.blocked,
+          free & marks.in_part & ~marks.whole};
 }
+
+/// The pixels [u0, u1] x [v0, v1] in which eight cubes are seen.
+struct PixelBoxes {
+  alignas(32) std::int32_t u0[8];
+  alignas(32) std::int32_t u1[8];
+  alignas(32) std::int32_t v0[8];
+  alignas(32) std::int32_t v1[8];
+};
 
 /// A camera's look at eight blocks: where in its pyramid, and which depths decide.
 struct Look {
+  PixelBoxes pixels;
+  const DepthPyramid* pyramid;
   const DepthEntry* entry;
   alignas(32) std::int32_t above[8];  ///< First entry of the upper row of a block's rectangle,
   alignas(32) std::int32_t below[8];  ///< and of the lower one.
@@ -156,19 +171,12 @@ HWY_INLINE auto store_pixels(V tangent, V half, float tan_half, float pixels_per
   return hn::Sub(end, first);
 }
 
-/// The pixels [u0, u1] x [v0, v1] in which eight cubes are seen.
-struct PixelBoxes {
-  alignas(32) std::int32_t u0[8];
-  alignas(32) std::int32_t u1[8];
-  alignas(32) std::int32_t v0[8];
-  alignas(32) std::int32_t v1[8];
-};
-
-/// Sets which entries of the pyramid hold these pixels. `side`: of the largest box, in pixels. One level for
+/// Sets which entries of the pyramid hold the pixels of a look. `side`: of the largest box, in pixels. One level for
 /// all eight blocks, so that the result does not depend on how many are done at once.
-HWY_INLINE void choose_entries(const DepthPyramid& pyramid, std::int32_t side, const PixelBoxes& pixels,
-                               Look& look) {
+HWY_INLINE void choose_entries(const DepthPyramid& pyramid, std::int32_t side, Look& look) {
   const Ints di;
+  const PixelBoxes& pixels = look.pixels;
+  look.pyramid = &pyramid;
   const DepthPyramid::Level& level =
       pyramid.level(std::max(DepthPyramid::level_for(side), pyramid.first_level()));
   look.entry = level.entry;
@@ -195,13 +203,14 @@ HWY_INLINE void choose_entries(const DepthPyramid& pyramid, std::int32_t side, c
 /// A cube of half-edge h around (x, y, z) in the camera's frame, x along the optical axis:
 ///   depth of its far and near side  x +- h extent
 ///   its image                       centre y / x, half width |d(y / x)| summed over the cube's axes
-///   free if every pixel of it sees  far + margin + quadratic far^2  (or its whole range)
+///   free if every pixel of it that is in no hole sees  far + margin + quadratic far^2  (or its whole range), and enough
+///   of them are in none
 ///   hidden if no pixel of it sees   near
 template <bool kInside>
 HWY_INLINE void aim(const SightCamera& c, float half_m, const Lanes& at, Look& look) {
   const Floats d;
   const Ints di;
-  PixelBoxes pixels;
+  PixelBoxes& pixels = look.pixels;
   const auto set = [&](float value) { return hn::Set(d, value); };
   unsigned outside = 0, straddling = 0, inside = kInside ? 0xFFU : 0U;
   auto longest = hn::Zero(di);
@@ -229,10 +238,16 @@ HWY_INLINE void aim(const SightCamera& c, float half_m, const Lanes& at, Look& l
     const auto half_over_near = hn::Div(half, nearest);
     const auto u = hn::Mul(y, inverse);
     const auto v = hn::Mul(z, inverse);
-    const auto columns = store_pixels(u, half_width(c, 1, u, half_over_near), c.tan_half_width,
-                                      c.columns_per_tan, c.last_column, pixels.u0 + i, pixels.u1 + i);
-    const auto rows = store_pixels(v, half_width(c, 2, v, half_over_near), c.tan_half_height, c.rows_per_tan,
-                                   c.last_row, pixels.v0 + i, pixels.v1 + i);
+    auto half_u = half_width(c, 1, u, half_over_near), half_v = half_width(c, 2, v, half_over_near);
+    if (c.widening > 0.0F || c.widening_m > 0.0F) {
+      const auto wider = hn::Add(set(c.widening), hn::Mul(set(c.widening_m), inverse));
+      half_u = hn::Add(half_u, wider);
+      half_v = hn::Add(half_v, wider);
+    }
+    const auto columns = store_pixels(u, half_u, c.tan_half_width, c.columns_per_tan, c.last_column,
+                                      pixels.u0 + i, pixels.u1 + i);
+    const auto rows =
+        store_pixels(v, half_v, c.tan_half_height, c.rows_per_tan, c.last_row, pixels.v0 + i, pixels.v1 + i);
     longest = hn::Max(longest, hn::Max(columns, rows));
     // What the camera calls empty up to its range is believed up to the range itself: no margin there.
     const auto margin = hn::Add(set(c.margin_m), hn::Mul(set(c.margin_quadratic_per_m), hn::Mul(far, far)));
@@ -245,12 +260,34 @@ HWY_INLINE void aim(const SightCamera& c, float half_m, const Lanes& at, Look& l
   look.straddling = straddling & ~outside;
   look.inside = inside & ~(outside | straddling);
 
-  choose_entries(*c.pyramid, hn::GetLane(hn::MaxOfLanes(di, longest)) + 1, pixels, look);
+  choose_entries(*c.pyramid, hn::GetLane(hn::MaxOfLanes(di, longest)) + 1, look);
+}
+
+/// Of some of eight blocks, those of which too many pixels are in holes.
+struct InHoles {
+  unsigned in_part{0}, sparse{0}, dark{0};
+};
+/// Of a cell half of the pixels are enough, at the second look; nearly all at the first. A larger block must be seen all over:
+/// what it hides may be large, too.
+HWY_INLINE InHoles in_holes(const Look& look, bool are_cells, unsigned blocks) {
+  InHoles result;
+  for (; blocks != 0; blocks &= blocks - 1) {
+    const auto i = static_cast<unsigned>(__builtin_ctz(blocks));
+    const PixelBoxes& p = look.pixels;
+    const DepthPyramid::Share share = look.pyramid->share(p.u0[i], p.v0[i], p.u1[i], p.v1[i]);
+    const bool enough = are_cells ? 8 * share.seen >= 7 * share.pixels : share.seen == share.pixels;
+    if (enough) continue;
+    unsigned& kind = share.seen == 0                               ? result.dark
+                     : are_cells && 2 * share.seen >= share.pixels ? result.in_part
+                                                                   : result.sparse;
+    kind |= 1U << i;
+  }
+  return result;
 }
 
 /// Adds to `marks` what this camera says of the eight blocks: it sees past all of a block, or nothing of it, or
-/// something in between.
-HWY_INLINE void look_through(const Look& look, Marks<unsigned>& marks) {
+/// something in between; or too few of its pixels say anything.
+HWY_INLINE void look_through(const Look& look, bool are_cells, Marks<unsigned>& marks) {
   const Floats d;
   const Ints di;
   unsigned sees_past = 0, hidden = 0;
@@ -264,10 +301,23 @@ HWY_INLINE void look_through(const Look& look, Marks<unsigned>& marks) {
   const unsigned looked = ~(look.outside | look.straddling) & 0xFFU;
   sees_past &= looked;
   hidden &= looked & ~sees_past;
+  unsigned mixed = looked & ~sees_past & ~hidden;
+  if (look.pyramid->has_holes()) {
+    const InHoles holes = in_holes(look, are_cells, sees_past | mixed);
+    const unsigned unseen = (holes.sparse & sees_past) | holes.dark;
+    sees_past &= ~unseen;
+    mixed &= ~holes.dark;
+    marks.in_part |= holes.in_part & sees_past;
+    marks.whole |= sees_past & look.inside & ~holes.in_part;
+    marks.sparse |= holes.sparse & unseen;
+    marks.unseen |= unseen;
+  } else {
+    marks.whole |= sees_past & look.inside;
+  }
   marks.free |= sees_past;
   marks.covered |= sees_past & look.inside;
   marks.blocked |= hidden & look.inside;
-  marks.mixed |= look.straddling | (looked & ~sees_past & ~hidden);
+  marks.mixed |= look.straddling | mixed;
 }
 
 HWY_INLINE float half_edge_m(int level) {

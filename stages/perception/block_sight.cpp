@@ -141,7 +141,7 @@ void see_blocks_lanes(const SightCameras& cameras, int level, std::span<const Ve
       Look look;
       aim<false>(c, half_m, eight, look);
       Marks<unsigned> here;
-      look_through(look, here);
+      look_through(look, false, here);
       const auto spread = [&](unsigned bits, std::uint64_t& to) {
         for (; bits != 0; bits &= bits - 1)
           to |= std::uint64_t{1} << in_view[first + static_cast<std::size_t>(__builtin_ctz(bits))];
@@ -150,6 +150,8 @@ void see_blocks_lanes(const SightCameras& cameras, int level, std::span<const Ve
       spread(here.mixed, marks.mixed);
       spread(here.blocked, marks.blocked);
       spread(here.covered, marks.covered);
+      spread(here.sparse, marks.sparse);
+      spread(here.unseen, marks.unseen);
     }
   }
   const Decision<std::uint64_t> decision = decide(marks, cameras.complete);
@@ -164,7 +166,7 @@ EightSeen see_children_lanes(const SightCameras& cameras, const SightBlock& pare
   Marks<unsigned> marks;
   EightSeen seen{};
   for (std::size_t j = 0; j < count; ++j) {
-    look_through(sight[j].look, marks);
+    look_through(sight[j].look, parent.level == 1, marks);
     for (unsigned i = 0; i < 8; ++i)
       seen.cameras[i] = static_cast<std::uint8_t>(seen.cameras[i] | (~(sight[j].look.outside >> i) & 1U)
                                                                         << sight[j].camera);
@@ -201,10 +203,11 @@ void see_brick_lanes(const SightCameras& cameras, const SightBlock& brick, int f
     seen.visited += static_cast<std::uint32_t>(nodes);
     for (std::size_t n = 0; n < nodes; ++n) {
       Marks<unsigned> marks;
-      for (std::size_t j = first[n]; j < first[n + 1]; ++j) look_through(sight[j].look, marks);
+      for (std::size_t j = first[n]; j < first[n + 1]; ++j) look_through(sight[j].look, level == 0, marks);
       const Decision<unsigned> decision = decide(marks, cameras.complete);
       seen.group[seen.count] = {static_cast<std::uint16_t>(morton[n]), static_cast<std::uint8_t>(level),
-                                static_cast<std::uint8_t>(decision.free)};
+                                static_cast<std::uint8_t>(decision.free),
+                                static_cast<std::uint8_t>(decision.in_part)};
       seen.count += decision.free != 0 ? 1U : 0U;
       seen.free_cells += static_cast<std::uint32_t>(__builtin_popcount(decision.free))
                          << (3U * static_cast<unsigned>(level));

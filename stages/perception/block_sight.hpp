@@ -38,6 +38,7 @@ struct FreeGroup {
   std::uint16_t parent;
   std::uint8_t level;
   std::uint8_t free;
+  std::uint8_t in_part;  ///< Of these, cells of which many pixels were in a hole.
 };
 /// Room for a group of each block of level 4 .. 1; there are those of divided ones with a free child, in any
 /// order.
@@ -57,7 +58,5 @@ struct BrickSeen {
 /// Divides a brick (level 4) down to blocks of level `finest` (0 .. 3). RT-safe: at most kMaxGroups times
 /// see_children().
 void see_brick(const SightCameras& cameras, const SightBlock& brick, int finest, BrickSeen& seen) noexcept;
-
-/// A row of an image as a line in cells of the finest level: pixel u at depth d ends at
 
 }  // namespace roborun::stages

@@ -22,23 +22,58 @@ constexpr std::array<std::uint32_t, 256> make_spread() noexcept {
 }
 constexpr std::array<std::uint32_t, 256> kSpreadBits = make_spread();
 
+/// The lowest bit of each half byte that holds something thin: odd, more than 1, less than 8.
+constexpr Word thin_in(Word word) noexcept {
+  return word & ((word >> 1U) | (word >> 2U)) & ~(word >> 3U) & kOnes;
+}
+
 /// evidence::after_miss() of those of sixteen cells whose half bytes are set in `selected`.
+template <bool kInPart, bool kOfTheThin>
 constexpr Word after_miss(Word word, Word selected) noexcept {
   const Word chosen = kOnes & selected;
   const Word occupied = (word >> 3U) & chosen;
-  const Word aged = (word | (chosen & ~occupied)) - occupied;
+  const Word thin = thin_in(word) & chosen;
+  const Word blank = chosen & ~(occupied | thin);  // unknown, free, or half of both
+  const Word first = kInPart ? blank & ~(word | (word >> 1U)) : Word{0};
+  Word aged = (word & ~(blank * 0xFU)) | (blank ^ first) | (first << 1U);
+  if (kOfTheThin) aged -= thin << 1U;
+  aged -= occupied;
   const Word cleared = occupied & ~(aged >> 3U);  // 8 became 7 and has to become kFree
   return aged ^ (cleared * (evidence::kOccupied ^ evidence::kFree));
 }
-static_assert([] {
-  for (unsigned cell = 0; cell < 16; ++cell) {
-    if (cell > evidence::kFree && !evidence::is_occupied(cell)) continue;
-    if (after_miss(kOnes * cell, kAll) != kOnes * evidence::after_miss(cell)) return false;
-    if (after_miss(kOnes * cell, 0xF0) != (kOnes * cell ^ ((cell ^ evidence::after_miss(cell)) << 4U)))
+template <bool kInPart, bool kOfTheThin>
+constexpr bool ages_as_its_cells() noexcept {
+  for (const unsigned cell : {0U, 1U, 2U, 3U, 5U, 7U, 8U, 9U, 10U, 11U, 12U, 13U, 14U, 15U}) {
+    const unsigned aged = evidence::after_miss(cell, {kInPart, kOfTheThin});
+    if (after_miss<kInPart, kOfTheThin>(kOnes * cell, kAll) != kOnes * aged) return false;
+    if (after_miss<kInPart, kOfTheThin>(kOnes * cell, 0xF0) != (kOnes * cell ^ ((cell ^ aged) << 4U)))
       return false;
   }
   return true;
-}());
+}
+static_assert(ages_as_its_cells<false, false>() && ages_as_its_cells<false, true>() &&
+              ages_as_its_cells<true, false>() && ages_as_its_cells<true, true>());
+
+template <bool kInPart, bool kOfTheThin>
+void miss(BrickWords& word, int level, std::uint32_t parent, std::uint8_t blocks) noexcept {
+  const auto age = [](Word& w, Word selected) { w = after_miss<kInPart, kOfTheThin>(w, selected); };
+  if (level == 0) {
+    age(word[parent / 2], Word{kSpreadBits[blocks]} << (32U * (parent % 2)));
+  } else if (level == 1) {
+    for (unsigned i = 0; i < 4; ++i) {
+      const unsigned two = (std::uint32_t{blocks} >> (2U * i)) & 3U;
+      age(word[4 * std::size_t{parent} + i],
+          ((two & 1U) != 0 ? 0xFFFFFFFFULL : 0U) | ((two & 2U) != 0 ? 0xFFFFFFFFULL << 32U : 0U));
+    }
+  } else {
+    const std::size_t count = (std::size_t{1} << (3U * static_cast<unsigned>(level))) / kCellsPerWord;
+    for (std::size_t i = 0; i < 8; ++i) {
+      if (((std::uint32_t{blocks} >> i) & 1U) == 0) continue;
+      Word* const first = &word[(8 * std::size_t{parent} + i) * count];
+      for (std::size_t k = 0; k < count; ++k) age(first[k], kAll);
+    }
+  }
+}
 
 }  // namespace
 
@@ -79,7 +114,7 @@ void Brick::read(CellBlock& cells) const noexcept {
     }
     const Word not_free = word[w] ^ (kOnes * evidence::kFree);
     const Word folded = not_free | (not_free >> 1U) | (not_free >> 2U) | (not_free >> 3U);
-    const Word free = ~folded & kOnes, occupied = (word[w] >> 3U) & kOnes;
+    const Word free = ~folded & kOnes, occupied = ((word[w] >> 3U) & kOnes) | thin_in(word[w]);
     for (unsigned pair = 0; pair < 4; ++pair) {
       const auto four = [pair](Word bits) {
         const Word b = bits >> (8U * pair);
@@ -100,25 +135,14 @@ void Brick::set_cell(std::uint32_t morton, unsigned value) noexcept {
   stale = true;
 }
 
-void Brick::add_free(int level, std::uint32_t parent, std::uint8_t blocks) noexcept {
+void Brick::add_free(int level, std::uint32_t parent, std::uint8_t blocks, evidence::Past past) noexcept {
   stale = true;
-  if (level == 0) {
-    Word& w = word[parent / 2];
-    w = after_miss(w, Word{kSpreadBits[blocks]} << (32U * (parent % 2)));
-  } else if (level == 1) {
-    for (unsigned i = 0; i < 4; ++i) {
-      const unsigned two = (std::uint32_t{blocks} >> (2U * i)) & 3U;
-      Word& w = word[4 * std::size_t{parent} + i];
-      w = after_miss(w,
-                     ((two & 1U) != 0 ? 0xFFFFFFFFULL : 0U) | ((two & 2U) != 0 ? 0xFFFFFFFFULL << 32U : 0U));
-    }
+  if (past.of_the_thin) {
+    past.in_part ? miss<true, true>(word, level, parent, blocks)
+                 : miss<false, true>(word, level, parent, blocks);
   } else {
-    const std::size_t count = (std::size_t{1} << (3U * static_cast<unsigned>(level))) / kCellsPerWord;
-    for (std::size_t i = 0; i < 8; ++i) {
-      if (((std::uint32_t{blocks} >> i) & 1U) == 0) continue;
-      Word* const first = &word[(8 * std::size_t{parent} + i) * count];
-      for (std::size_t k = 0; k < count; ++k) first[k] = after_miss(first[k], kAll);
-    }
+    past.in_part ? miss<true, false>(word, level, parent, blocks)
+                 : miss<false, false>(word, level, parent, blocks);
   }
 }
 

@@ -32,9 +32,15 @@ struct Brick {
   /// Flags of the cell of `level` (0 .. 4) with this Morton index. After refresh(). O(1).
   [[nodiscard]] inline std::uint8_t flags(int level, std::uint32_t morton) const noexcept;
   /// Free evidence for the blocks of `level` with Morton index 8 * parent + i, for each bit i of `blocks`.
-  void add_free(int level, std::uint32_t parent, std::uint8_t blocks) noexcept;
+  void add_free(int level, std::uint32_t parent, std::uint8_t blocks, evidence::Past past = {}) noexcept;
   /// A surface in this cell of level 0.
   void add_hit(std::uint32_t morton) noexcept { set_cell(morton, evidence::after_hit(cell(morton))); }
+  /// A surface near this cell, nobody knows exactly where: what was free is unknown.
+  void add_vague_hit(std::uint32_t morton) noexcept {
+    if (!evidence::is_occupied(cell(morton))) set_cell(morton, evidence::kUnknown);
+  }
+  /// Something thin in it.
+  void add_thin(std::uint32_t morton) noexcept { set_cell(morton, evidence::kThin); }
 };
 
 /// Index of an entry in Brick::mip; level 1 .. 4.
@@ -46,8 +52,8 @@ struct Brick {
 inline std::uint8_t Brick::flags(int level, std::uint32_t morton) const noexcept {
   if (level > 0) return mip[mip_index(level, morton)];
   const unsigned value = cell(morton);
-  if (value == evidence::kUnknown) return content::kUnknown;
-  return evidence::is_occupied(value) ? content::kOccupied : content::kFree;
+  if (evidence::is_occupied(value)) return content::kOccupied;
+  return value == evidence::kFree ? content::kFree : content::kUnknown;
 }
 
 inline constexpr std::array<std::uint16_t, 16> kMortonSpread{0x000, 0x001, 0x008, 0x009, 0x040, 0x041,

@@ -14,23 +14,39 @@ inline constexpr int kBrickCells = 1 << kBrickLevel;  ///< Per edge.
 inline constexpr std::size_t kCellsPerBrick = 4096;
 inline constexpr double kBrick_m = cell_size_m(kBrickLevel);
 
-/// What a cell holds, four bits: unknown, free, or occupied with evidence 1 .. 8. One look through free space
-/// makes it free; one surface makes it occupied whatever was there; kMost looks through it clear the oldest
-/// obstacle, kHit looks one that was seen once.
+/// What a cell holds, four bits: unknown, free, or a surface.
+///   0       unknown
+///   1       free: seen past
+///   2       seen past in part, once: still unknown
+///   3 5 7   something thin, evidence 1 .. 3: only looks that would have seen it take from it
+///   8 .. 15 a surface, evidence 1 .. 8
+/// One look past all of a cell makes it free, two looks past a part of it do; one surface makes it occupied whatever was
+/// there; 8 looks past it clear the oldest obstacle, kHit looks one that was seen once.
 namespace evidence {
 inline constexpr unsigned kUnknown = 0;
 inline constexpr unsigned kFree = 1;
-inline constexpr unsigned kOccupied = 7;  ///< Plus the evidence: bit 3 is set of what is occupied alone.
+inline constexpr unsigned kPartlyFree = 2;
+inline constexpr unsigned kThin = 7;      ///< As it is when it was just seen.
+inline constexpr unsigned kOccupied = 7;  ///< Plus the evidence.
 inline constexpr unsigned kHit = 3;
 inline constexpr unsigned kMost = 8;
 
-[[nodiscard]] constexpr bool is_occupied(unsigned cell) noexcept { return cell > kOccupied; }
+[[nodiscard]] constexpr bool is_occupied(unsigned cell) noexcept { return cell > kPartlyFree; }
+[[nodiscard]] constexpr bool is_thin(unsigned cell) noexcept { return is_occupied(cell) && cell <= kThin; }
 [[nodiscard]] constexpr unsigned after_hit(unsigned cell) noexcept {
+  if (is_thin(cell)) return kThin;
   const unsigned next = (is_occupied(cell) ? cell : kOccupied) + kHit;
   return next > kOccupied + kMost ? kOccupied + kMost : next;
 }
-[[nodiscard]] constexpr unsigned after_miss(unsigned cell) noexcept {
-  return cell > kOccupied + 1 ? cell - 1 : kFree;
+/// What a look past a cell was like.
+struct Past {
+  bool in_part{};      ///< Many pixels had no information.
+  bool of_the_thin{};  ///< It counts for what is thin.
+};
+[[nodiscard]] constexpr unsigned after_miss(unsigned cell, Past past = {}) noexcept {
+  if (is_thin(cell)) return past.of_the_thin ? cell - 2 : cell;
+  if (is_occupied(cell)) return cell > kOccupied + 1 ? cell - 1 : kFree;
+  return past.in_part && cell == kUnknown ? kPartlyFree : kFree;
 }
 }  // namespace evidence
 

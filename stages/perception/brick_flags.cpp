@@ -15,7 +15,7 @@ namespace roborun::stages::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 std::size_t brick_flags_lanes(const std::uint64_t* word, std::uint8_t* mip) {
-  // Of eight cells, half bytes: bit 0 alone is free, bit 3 is occupied, 0 is unknown.
+  // Of eight cells, half bytes: bit 0 alone is free; bit 3, or bit 0 with others, is occupied; else unknown.
   constexpr std::uint32_t kOnes = 0x11111111U;
   std::size_t unknown = 0;
   std::size_t i = 0;
@@ -30,7 +30,8 @@ std::size_t brick_flags_lanes(const std::uint64_t* word, std::uint8_t* mip) {
   auto sum = zero;
   for (; i < kCellsPerBrick / 8; i += hn::Lanes(d)) {
     const auto cells = hn::BitCast(d, hn::LoadU(d64, word + i / 2));
-    const auto occupied = hn::And(hn::ShiftRight<3>(cells), ones);
+    const auto more = hn::Or(hn::ShiftRight<1>(cells), hn::ShiftRight<2>(cells));
+    const auto occupied = hn::And(hn::Or(hn::ShiftRight<3>(cells), hn::And(cells, more)), ones);
     const auto free = hn::AndNot(occupied, hn::And(cells, ones));
     const auto unknown_here = hn::AndNot(hn::Or(occupied, free), ones);
     sum = hn::Add(sum, hn::ShiftRight<28>(hn::Mul(unknown_here, ones)));
@@ -42,7 +43,8 @@ std::size_t brick_flags_lanes(const std::uint64_t* word, std::uint8_t* mip) {
 #endif
   for (; i < kCellsPerBrick / 8; ++i) {
     const auto cells = static_cast<std::uint32_t>(word[i / 2] >> (32U * (i % 2)));
-    const std::uint32_t occupied = (cells >> 3U) & kOnes, free = cells & kOnes & ~occupied;
+    const std::uint32_t occupied = ((cells >> 3U) | (cells & ((cells >> 1U) | (cells >> 2U)))) & kOnes;
+    const std::uint32_t free = cells & kOnes & ~occupied;
     const std::uint32_t unknown_here = kOnes & ~(occupied | free);
     unknown += (unknown_here * kOnes) >> 28U;
     mip[i] = static_cast<std::uint8_t>((unknown_here != 0 ? content::kUnknown : 0U) |

@@ -42,8 +42,7 @@ Status BrickMap::Config::validate() const noexcept {
                   core::within<std::size_t>(max_frames, 1, kMaxCameras) && all_around_frames <= max_frames &&
                   core::within<std::size_t>(max_image_width, 8, kMaxImageSide) &&
                   core::within<std::size_t>(max_image_height, 8, kMaxImageSide) &&
-                  core::within(vehicle_radius_m, 0.0, 2.0) && core::within(depth_margin_m, 0.0, 10.0) &&
-                  core::within(depth_margin_quadratic_per_m, 0.0, 1.0);
+                  core::within(vehicle_radius_m, 0.0, 2.0) && core::within(thinnest_m, 0.005, 1.0);
   return ok ? Status::kOk : Status::kInvalidArgument;
 }
 
@@ -156,7 +155,7 @@ void BrickMap::free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noe
     if (slot > kFreeBrick) known_cells_ += kCellsPerBrick;
     slot = free_now_;
   } else if (Brick* brick = touch(bx, by, bz)) {
-    brick->add_free(kBrickLevel, 0, 1U);
+    brick->add_free(kBrickLevel, 0, 1U, {false, counts_for_the_thin(bx, by, bz)});
     brick->cleared = free_now_;
   }
 }
@@ -175,7 +174,7 @@ void BrickMap::free_vehicle() noexcept {
         Brick* brick = touch(bx, by, bz);
         if (brick == nullptr) continue;
         const std::uint32_t morton = morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z));
-        brick->add_free(0, morton / 8, static_cast<std::uint8_t>(1U << (morton % 8)));
+        brick->add_free(0, morton / 8, static_cast<std::uint8_t>(1U << (morton % 8)), {false, true});
       }
     }
   }
@@ -196,7 +195,7 @@ void BrickMap::assume_free(const Vector3& half_m) noexcept {
         Brick* brick = touch(bx, by, bz);
         if (brick == nullptr) continue;
         const std::uint32_t morton = morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z));
-        if (brick->cell(morton) != evidence::kUnknown) continue;
+        if (evidence::is_occupied(brick->cell(morton))) continue;
         brick->add_free(0, morton / 8, static_cast<std::uint8_t>(1U << (morton % 8)));
       }
     }

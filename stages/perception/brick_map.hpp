@@ -26,6 +26,7 @@
 #include "stages/perception/frame_guard.hpp"
 #include "stages/perception/image_lines.hpp"
 #include "stages/perception/occupancy_map.hpp"
+#include "stages/perception/pixel_kinds.hpp"
 
 namespace roborun::stages {
 
@@ -43,9 +44,8 @@ class BrickMap final : public OccupancyMap, private MapView {
     std::size_t max_image_height{512};  ///< Pixels, of the largest image. [8, 1280]
     double vehicle_radius_m{
         VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is: free. [0, 2]
-    double depth_margin_m{0.05};   ///< A cell is free only if every pixel sees this much past it [0, 10] ...
-    /// ... plus this times depth squared, in metres: three sigma of a stereo camera. [0, 1]
-    double depth_margin_quadratic_per_m{0.0012};
+    /// The thinnest thing that must not be forgotten once it was seen. [0.005, 1]
+    double thinnest_m{VehicleModel{}.thinnest_m};
     /// kInvalidArgument if a number is out of range, or the bounds hold more than 4 million bricks.
     [[nodiscard]] Status validate() const noexcept;
   };
@@ -78,6 +78,9 @@ class BrickMap final : public OccupancyMap, private MapView {
   struct Cell {
     std::int32_t x, y, z;
   };
+  static constexpr double kOrderStep_m =
+      0.5;  ///< Units whose distances differ by less keep their order in space.
+  static constexpr int kBlockLevel = kBrickLevel + 1;
   static constexpr std::int32_t kUnknownBrick = -1;
   /// Nothing known but that a look at p0 >= 4.8 m met a surface there: occupied as a brick, unknown below.
   static constexpr std::int32_t kSurfaceBrick = -2;
@@ -132,21 +135,37 @@ class BrickMap final : public OccupancyMap, private MapView {
   void clear_brick(const Position& at, std::uint8_t cameras, int finest, core::Work& work) noexcept;
   void free_unit(const Position& unit) noexcept;
   void free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
+  /// Whether a look past what is in this brick counts for something thin in it: not each look would have met it. A pole of
+  /// thinnest_m is a part of thinnest_m / (pitch distance) of a pixel wide, and is met by that part of all looks; it is believed to
+  /// be there until it should have been met kThinPatience times: each scan counts near the vehicle, each second one twice as
+  /// far, and so on.
+  [[nodiscard]] bool counts_for_the_thin(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
+    return (brick_center_W(bx, by, bz) - vehicle_W_).squaredNorm() < thin_reach_m_ * thin_reach_m_;
+  }
   /// A camera whose surfaces are being written.
   struct SurfaceCamera {
     const PosedDepthFrame* posed{};
     double column_pitch{}, row_pitch{};  ///< Of the pixels, at depth 1.
     int level{};  ///< p0. A brick or more: surfaces in unknown bricks are noted, not written.
     PixelLine line{};
+    PixelRules kinds{};
+    float exact_m{};       ///< Farther away nobody knows in which cell a pixel ends.
+    float thin_reach_m{};  ///< What is a pixel wide there may still be a pole; beyond it a body.
+    std::span<const Vector3> moved_W{};
     [[nodiscard]] bool is_coarse() const noexcept { return level >= kBrickLevel; }
   };
   /// Of column u and row v of the image, in edges, for a depth of 1.
   [[nodiscard]] static std::array<float, 3> direction(const SurfaceCamera& camera, double u, double v,
                                                       double edge_m) noexcept;
+  [[nodiscard]] static bool moved_nearby(std::span<const Vector3> moved_W, const Vector3& p_W) noexcept;
   void add_surfaces(const IntegrationRequest& request, core::Work& work) noexcept;
   /// The pixels [u0, u1) of row v.
   void add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
                   core::Work& work) noexcept;
+  /// The cells in row_.
+  void add_cells(const SurfaceCamera& camera, bool vague, core::Work& work) noexcept;
+  /// Those of pixels_ that show something thin, but for what lately moved there.
+  void add_thin_pixels(const SurfaceCamera& camera, const PixelLine& line) noexcept;
   /// Tile by tile: pixels are looked at where they may end in space of which something was known before.
   void add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, core::Work& work) noexcept;
   /// True if nothing is known of all space in which this tile of tiles_ may end: then that is all to be done.
@@ -203,6 +222,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   FrameGuard guard_{};
   SightCameras cameras_{};
   BrickSeen seen_{};
+  PixelRow pixels_{};
   SurfaceRow row_{};
   TileRow tiles_{};
   double reach_m_{0.0};    ///< From the trajectory: v0 was spent up to here.
@@ -213,6 +233,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   std::uint64_t known_cells_{0};
   std::int32_t free_now_{kFreeBrick};  ///< A slot that is free and was seen past as a whole in this scan.
   Vector3 vehicle_W_ = Vector3::Zero();
+  double thin_reach_m_{0.0};  ///< Of this scan: counts_for_the_thin().
   int view_level_{0};
   double view_radius_m_{0.0};  ///< Bricks whose centre is farther from view_center_W_ are unknown.
   Vector3 view_center_W_ = Vector3::Zero();

@@ -9,11 +9,9 @@
 namespace roborun::stages {
 namespace {
 
-constexpr double kOrderStep_m = 0.5;  // blocks whose distances differ by less keep their order in space
-constexpr int kBlockLevel = kBrickLevel + 1;
-constexpr int kTileLevel = 2;  // where a tile may end is known in cells of this size
-constexpr double kTileCell_m = cell_size_m(kTileLevel);
-constexpr std::int32_t kTileCells = 1 << (kBrickLevel - kTileLevel);  // of a brick's edge
+/// So often must something thin not be met where it should be until it is believed to be gone.
+constexpr double kThinPatience = 4.0;
+constexpr double kMoved_m = 1.5;  // about twice a body's radius
 
 /// Tiles of at most half the image that a cell of p0 has at the end of the range.
 int tile_shift(const firmware_if::DepthFrame& frame, int level) noexcept {
@@ -32,6 +30,7 @@ int tile_shift(const firmware_if::DepthFrame& frame, int level) noexcept {
 
 std::size_t BrickMap::usable_frames(const IntegrationRequest& request, IntegrationResult& result) noexcept {
   std::size_t clouds = 0;
+  bool any = false;
   cameras_.count = 0;
   guard_.begin(request.frames);
   for (std::size_t i = 0; i < request.frames.size(); ++i) {
@@ -40,13 +39,13 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
     // All pixels are read once, by the pyramid: it counts what the guard has to know.
     if (image == nullptr || check_shape(posed) != Status::kOk ||
         image->build(posed.frame, tile_shift(posed.frame, request.level)) != Status::kOk ||
-        guard_.check(posed, image->informed_count()) != Status::kOk ||
-        (!image->shows_surface() && is_white(posed, request.moved_W))) {
+        guard_.check_content(posed) != Status::kOk ||
+        (!image->shows_surface() && image->shows_anything() && is_white(posed, request.moved_W))) {
       ++result.frames_refused;
       continue;
     }
-    cameras_.camera[cameras_.count].prepare(posed, *image,
-                                            {config_.depth_margin_m, config_.depth_margin_quadratic_per_m});
+    cameras_.camera[cameras_.count].prepare(posed, *image);
+    any = any || image->shows_anything();
     clouds += posed.is_cloud ? 1U : 0U;
     frame_of_[cameras_.count++] = i;
   }
@@ -54,7 +53,7 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
   const std::size_t images = cameras_.count - clouds;
   cameras_.complete =
       clouds > 0 ? images == 0 && clouds == CloudImages::kImages : images == config_.all_around_frames;
-  return cameras_.count;
+  return any ? cameras_.count : 0;
 }
 
 std::size_t BrickMap::unit_index(const Position& unit) const noexcept {
@@ -89,16 +88,10 @@ Vector3 BrickMap::unit_center_W(const Position& unit) const noexcept {
 bool BrickMap::is_white(const PosedDepthFrame& posed, std::span<const Vector3> moved_W) const noexcept {
   constexpr int kRays = 8;          // in each direction
   constexpr int kLeastBlocked = 3;  // one may be a stray cell
-  constexpr double kMoved_m = 1.5;  // about twice a body's radius
-  constexpr double kStep_m = 0.5 * kBrick_m, kFineStep_m = 0.5 * kFinestCell_m;
+  constexpr double kBrickStep_m = 0.5 * kBrick_m, kFineStep_m = 0.5 * kFinestCell_m;
   const firmware_if::DepthFrame& frame = posed.frame;
   if (posed.is_cloud) return false;
   const double end_m = 0.8 * static_cast<double>(frame.range_m);
-  const auto moved_nearby = [&moved_W](const Vector3& p_W) {
-    return std::any_of(moved_W.begin(), moved_W.end(), [&p_W](const Vector3& m_W) {
-      return (m_W - p_W).squaredNorm() < kMoved_m * kMoved_m;
-    });
-  };
   Cell cell{};
   const auto brick_around = [&](const Vector3& p_W) -> const Brick* {
     if (!cell_of(p_W, cell)) return nullptr;
@@ -107,16 +100,16 @@ bool BrickMap::is_white(const PosedDepthFrame& posed, std::span<const Vector3> m
   const auto meets_surface = [&](const Vector3& ray_W) {
     const double length = ray_W.norm();
     bool near_end = true;  // The brick at that end of the piece has a surface.
-    for (double far_m = kStep_m / length; far_m < end_m; far_m += kStep_m / length) {
+    for (double far_m = kBrickStep_m / length; far_m < end_m; far_m += kBrickStep_m / length) {
       const Brick* brick = brick_around(posed.X_WC.p_RT + far_m * ray_W);
       const bool far_end = brick != nullptr && (brick->flags(kBrickLevel, 0) & content::kOccupied) != 0;
       if (!std::exchange(near_end, far_end) && !far_end) continue;
-      for (double at_m = far_m - kStep_m / length; at_m < far_m; at_m += kFineStep_m / length) {
+      for (double at_m = far_m - kBrickStep_m / length; at_m < far_m; at_m += kFineStep_m / length) {
         const Vector3 at_W = posed.X_WC.p_RT + at_m * ray_W;
         brick = brick_around(at_W);
         if (brick != nullptr &&
             evidence::is_occupied(brick->cell(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)))))
-          return !moved_nearby(at_W);
+          return !moved_nearby(moved_W, at_W);
       }
     }
     return false;
@@ -216,8 +209,14 @@ void BrickMap::clear_brick(const Position& at, std::uint8_t cameras, int finest,
   if (seen_.count == 0 || slot_[slot_of(at.x, at.y, at.z)] <= kFreeBrick) return;
   Brick* const brick = touch(at.x, at.y, at.z);
   if (brick == nullptr) return;  // pool full, and nothing farther away to give up
-  for (std::size_t i = 0; i < seen_.count; ++i)
-    brick->add_free(seen_.group[i].level, seen_.group[i].parent, seen_.group[i].free);
+  const bool thin = counts_for_the_thin(at.x, at.y, at.z);
+  for (std::size_t i = 0; i < seen_.count; ++i) {
+    const FreeGroup& group = seen_.group[i];
+    if (group.in_part != group.free)
+      brick->add_free(group.level, group.parent, static_cast<std::uint8_t>(group.free & ~group.in_part),
+                      {false, thin});
+    if (group.in_part != 0) brick->add_free(group.level, group.parent, group.in_part, {true, thin});
+  }
   refresh(*brick);  // while it is in the cache
 }
 
@@ -281,158 +280,9 @@ void BrickMap::free_unit(const Position& unit) noexcept {
     free_brick(2 * unit.x + (child & 1), 2 * unit.y + ((child >> 1) & 1), 2 * unit.z + (child >> 2));
 }
 
-std::array<float, 3> BrickMap::direction(const SurfaceCamera& camera, double u, double v,
-                                         double edge_m) noexcept {
-  const Matrix3& R = camera.posed->X_WC.R_RT;
-  const double y = camera.column_pitch * (0.5 * camera.posed->frame.width - u);
-  const double z = camera.row_pitch * (0.5 * camera.posed->frame.height - v);
-  std::array<float, 3> result{};
-  for (int axis = 0; axis < 3; ++axis)
-    result[static_cast<std::size_t>(axis)] =
-        static_cast<float>((R(axis, 0) + R(axis, 1) * y + R(axis, 2) * z) / edge_m);
-  return result;
-}
-
-bool BrickMap::paid(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
-  const int up = unit_level_ - kBrickLevel;
-  const Position unit{bx >> up, by >> up, bz >> up};
-  const bool in_reach = unit.x >= first_unit_.x && unit.y >= first_unit_.y && unit.z >= first_unit_.z &&
-                        unit.x <= last_unit_.x && unit.y <= last_unit_.y && unit.z <= last_unit_.z;
-  return in_reach && order_key_[unit_index(unit)] * kOrderStep_m <= reach_m_;
-}
-
-void BrickMap::add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
-                          core::Work& work) noexcept {
-  const firmware_if::DepthFrame& frame = camera.posed->frame;
-  PixelLine line = camera.line;
-  line.first = direction(camera, static_cast<double>(u0) + 0.5, static_cast<double>(v) + 0.5, kFinestCell_m);
-  end_cells(line, frame.depth_m.subspan(v * frame.width + u0, u1 - u0), {frame.range_min_m, frame.range_m},
-            row_);
-  std::size_t last_position = slot_.size();
-  Brick* brick = nullptr;
-  for (std::size_t n = 0; n < row_.count; ++n) {
-    const Cell cell{row_.cell[0][n], row_.cell[1][n], row_.cell[2][n]};
-    const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
-    const std::size_t position = slot_of(bx, by, bz);
-    if (position != last_position) {
-      last_position = position;
-      // Beyond the space that v0 paid for nothing is written: neither free nor occupied.
-      brick = paid(bx, by, bz) ? surface_brick(bx, by, bz, camera.is_coarse()) : nullptr;
-    }
-    if (brick == nullptr) continue;
-    brick->add_hit(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)));
-    ++work.units;
-  }
-}
-
-Brick* BrickMap::surface_brick(std::int32_t bx, std::int32_t by, std::int32_t bz, bool coarse) noexcept {
-  std::int32_t& slot = slot_[slot_of(bx, by, bz)];
-  if (!coarse || slot >= 0 || slot <= kFreeBrick) return touch(bx, by, bz);
-  slot = kSurfaceBrick;
-  return nullptr;
-}
-
-bool BrickMap::knows(const Brick& brick, const Cell& low, const Cell& high) const noexcept {
-  if (brick.cleared == free_now_) return false;
-  const auto first = [](std::int32_t from, std::int32_t at) {
-    return static_cast<std::uint32_t>(std::max(from - at * kTileCells, 0));
-  };
-  const auto last = [](std::int32_t to, std::int32_t at) {
-    return static_cast<std::uint32_t>(std::min(to - at * kTileCells, kTileCells - 1));
-  };
-  for (std::uint32_t z = first(low.z, brick.z); z <= last(high.z, brick.z); ++z)
-    for (std::uint32_t y = first(low.y, brick.y); y <= last(high.y, brick.y); ++y)
-      for (std::uint32_t x = first(low.x, brick.x); x <= last(high.x, brick.x); ++x)
-        if (brick.flags(kTileLevel, morton3(x, y, z)) != content::kUnknown) return true;
-  return false;
-}
-
-bool BrickMap::note_surface(std::size_t tile) noexcept {
-  if (!tiles_.surface[tile]) return true;
-  constexpr int kShift = kBrickLevel - kTileLevel;
-  const Cell low{tiles_.low[0][tile], tiles_.low[1][tile], tiles_.low[2][tile]};
-  const Cell high{tiles_.high[0][tile], tiles_.high[1][tile], tiles_.high[2][tile]};
-  const std::int32_t x0 = std::max(low.x >> kShift, 0), x1 = std::min(high.x >> kShift, nx_ - 1);
-  for (std::int32_t bz = std::max(low.z >> kShift, 0); bz <= std::min(high.z >> kShift, nz_ - 1); ++bz) {
-    for (std::int32_t by = std::max(low.y >> kShift, 0); by <= std::min(high.y >> kShift, ny_ - 1); ++by) {
-      const std::int32_t* const row = slot_.data() + slot_of(0, by, bz);
-      for (std::int32_t bx = x0; bx <= x1; ++bx) {
-        const std::int32_t slot = row[bx];
-        if (slot == kUnknownBrick || slot == kSurfaceBrick || slot == free_now_) continue;
-        if (slot < 0 || knows(brick_[static_cast<std::size_t>(slot)], low, high)) return false;
-      }
-    }
-  }
-  const Cell at{tiles_.nearest[0][tile] >> kShift, tiles_.nearest[1][tile] >> kShift,
-                tiles_.nearest[2][tile] >> kShift};
-  const bool inside = at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x < nx_ && at.y < ny_ && at.z < nz_;
-  if (!inside || !paid(at.x, at.y, at.z)) return true;
-  std::int32_t& slot = slot_[slot_of(at.x, at.y, at.z)];
-  if (slot == kUnknownBrick) slot = kSurfaceBrick;
-  return true;
-}
-
-void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image, core::Work& work) noexcept {
-  const firmware_if::DepthFrame& frame = camera.posed->frame;
-  const Matrix3& R = camera.posed->X_WC.R_RT;
-  // Two tiles of the pyramid a side, four for blocks: every second entry of a level above them.
-  const DepthPyramid::Level& wide = image.level(image.tiles().shift + (camera.level >= kBlockLevel ? 2 : 1));
-  const std::size_t side = std::size_t{2} << static_cast<unsigned>(wide.shift);
-  const std::size_t columns = (static_cast<std::size_t>(wide.width) + 1) / 2;
-  const double across = camera.column_pitch * static_cast<double>(side);
-  const double along = camera.row_pitch * static_cast<double>(side);
-  const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kTileCell_m;
-  TileLine line;
-  line.steps_per_m = image.steps_per_m();
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto k = static_cast<std::size_t>(axis);
-    line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
-    line.rest[k] = static_cast<float>(origin[axis] - line.origin[k]);
-    line.step[k] = static_cast<float>(-across * R(axis, 1) / kTileCell_m);
-    line.half[k] = static_cast<float>(0.5 * (across * std::fabs(R(axis, 1)) + along * std::fabs(R(axis, 2))) /
-                                      kTileCell_m);
-  }
-  const DepthPyramid::Entry* entry = wide.entry;
-  for (std::size_t v = 0; v < frame.height; v += side, entry += 2 * static_cast<std::size_t>(wide.width)) {
-    const double half = 0.5 * static_cast<double>(side);
-    line.first = direction(camera, half, static_cast<double>(v) + half, kTileCell_m);
-    tile_boxes(line, {entry, 2, columns}, tiles_);
-    work.units += columns;
-    for (std::size_t x = 0; x < columns; ++x) {
-      if (note_surface(x)) continue;
-      std::size_t end = x + 1;
-      while (end < columns && !note_surface(end)) ++end;
-      for (std::size_t row = v; row < std::min<std::size_t>(v + side, frame.height); ++row)
-        add_pixels(camera, row, x * side, std::min<std::size_t>(end * side, frame.width), work);
-      x = end;
-    }
-  }
-}
-
-void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work) noexcept {
-  for (std::size_t i = 0; i < cameras_.count; ++i) {
-    SurfaceCamera camera;
-    camera.posed = &request.frames[frame_of_[i]];
-    camera.level = request.level;
-    const firmware_if::DepthFrame& frame = camera.posed->frame;
-    camera.column_pitch = 2.0 * static_cast<double>(frame.tan_half_width) / frame.width;
-    camera.row_pitch = 2.0 * static_cast<double>(frame.tan_half_height) / frame.height;
-    const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kFinestCell_m;
-    camera.line.low = {low_.x, low_.y, low_.z};
-    camera.line.high = {high_.x, high_.y, high_.z};
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto k = static_cast<std::size_t>(axis);
-      camera.line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
-      camera.line.rest[k] = static_cast<float>(origin[axis] - camera.line.origin[k]);
-      camera.line.step[k] =
-          static_cast<float>(-camera.column_pitch / kFinestCell_m * camera.posed->X_WC.R_RT(axis, 1));
-    }
-    if (camera.is_coarse()) {
-      add_tiles(camera, *pyramid_[i], work);
-    } else {
-      for (std::size_t v = 0; v < frame.height; ++v) add_pixels(camera, v, 0, frame.width, work);
-    }
-  }
+bool BrickMap::moved_nearby(std::span<const Vector3> moved_W, const Vector3& p_W) noexcept {
+  return std::any_of(moved_W.begin(), moved_W.end(),
+                     [&p_W](const Vector3& m_W) { return (m_W - p_W).squaredNorm() < kMoved_m * kMoved_m; });
 }
 
 Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget& budget,
@@ -443,6 +293,12 @@ Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget&
   ++counters_.scans;
   free_now_ = kFreeBrick - 1 - static_cast<std::int32_t>(counters_.scans % kFreeStamps);
   vehicle_W_ = cameras_.camera[0].p_WC - request.frames[frame_of_[0]].p_BC_W;
+  double pitch = 0.0;
+  for (std::size_t i = 0; i < cameras_.count; ++i)
+    pitch = std::max({pitch, 1.0 / static_cast<double>(cameras_.camera[i].columns_per_tan),
+                      1.0 / static_cast<double>(cameras_.camera[i].rows_per_tan)});
+  thin_reach_m_ = std::ldexp(config_.thinnest_m / (kThinPatience * pitch),
+                             std::countr_zero(counters_.scans | std::uint64_t{1} << 20U));
   const std::size_t count = order_units(request);
   const std::size_t done = clear_units(count, request, budget, result.work);
   reach_m_ = done < count ? 0.0 : std::numeric_limits<double>::infinity();

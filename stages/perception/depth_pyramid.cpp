@@ -24,19 +24,20 @@ Entry min_of(Entry a, Entry b) noexcept {
   return {min16(a.least_steps, b.least_steps), min16(a.not_most_steps, b.not_most_steps)};
 }
 
-/// See the class comment: a lone dropout counts as the nearest of its neighbours.
-float bridged_m(const firmware_if::DepthFrame& frame, std::size_t x, std::size_t y) noexcept {
-  const std::size_t width = frame.width;
-  const std::size_t i = y * width + x;
-  const auto seen_m = [&frame](std::size_t k) {
-    return visible_depth_m(frame.depth_m[k], frame.range_m, frame.range_min_m);
-  };
+/// See the class comment: the nearest neighbour of a pixel without information, or 0 if most have none either.
+float bridged_m(const firmware_if::DepthFrame& frame, std::size_t u, std::size_t v) noexcept {
   float nearest_m = frame.range_m;
-  if (x > 0) nearest_m = std::min(nearest_m, seen_m(i - 1));
-  if (x + 1 < width) nearest_m = std::min(nearest_m, seen_m(i + 1));
-  if (y > 0) nearest_m = std::min(nearest_m, seen_m(i - width));
-  if (y + 1 < frame.height) nearest_m = std::min(nearest_m, seen_m(i + width));
-  return nearest_m;
+  int neighbours = 0, known = 0;
+  for (std::size_t y = v > 0 ? v - 1 : 0; y < std::min<std::size_t>(v + 2, frame.height); ++y) {
+    for (std::size_t x = u > 0 ? u - 1 : 0; x < std::min<std::size_t>(u + 2, frame.width); ++x) {
+      ++neighbours;  // itself among them
+      const float depth_m = frame.depth_m[y * frame.width + x];
+      if (!(depth_m > frame.range_min_m)) continue;
+      ++known;
+      nearest_m = std::min(nearest_m, depth_m);
+    }
+  }
+  return 2 * known > neighbours ? nearest_m : 0.0F;
 }
 
 std::size_t entry_count(std::size_t width, std::size_t height) noexcept {
@@ -53,56 +54,84 @@ std::size_t entry_count(std::size_t width, std::size_t height) noexcept {
 }  // namespace
 
 std::size_t DepthPyramid::arena_bytes(std::size_t max_width, std::size_t max_height) noexcept {
-  return entry_count(max_width, max_height) * sizeof(Entry) + alignof(std::max_align_t);
+  return entry_count(max_width, max_height) * sizeof(Entry) +
+         (max_width + 1) * (max_height + 1) * sizeof(std::uint32_t) + 2 * alignof(std::max_align_t);
 }
 
 DepthPyramid::DepthPyramid(core::Arena& arena, std::size_t max_width, std::size_t max_height) noexcept
     : max_width_(max_width), max_height_(max_height) {
   memory_ = arena.take<Entry>(entry_count(max_width, max_height), "map depth pyramid");
   pool_ = &arena.last_pool();
+  seen_ = arena.take<std::uint32_t>((max_width + 1) * (max_height + 1), "map seen pixels");
+  arena.last_pool().use(seen_.size());
 }
 
-void DepthPyramid::bridge_columns(const firmware_if::DepthFrame& frame, std::size_t first, std::size_t y,
-                                  unsigned shift, Entry* tile) noexcept {
-  const std::size_t end = std::min<std::size_t>(first + 8, frame.width);
+void DepthPyramid::count_strip(const firmware_if::DepthFrame& frame, std::size_t y, unsigned shift,
+                               const StripSeen& strip, Entry* tile) noexcept {
+  const std::size_t columns = (frame.width + (std::size_t{1} << shift) - 1) >> shift, row = columns + 1;
+  std::uint32_t* const above = seen_.data() + (y >> shift) * row;
+  std::uint32_t* const below = above + row;
   const std::size_t bottom = std::min<std::size_t>(y + (std::size_t{1} << shift), frame.height);
-  for (std::size_t v = y; v < bottom; ++v) {
-    for (std::size_t u = first; u < end; ++u) {
-      if (frame.depth_m[v * frame.width + u] > frame.range_min_m) continue;
-      --informed_count_;
-      Entry& entry = tile[u >> shift];
-      entry = min_of(entry, entry_of(bridged_m(frame, u, v), frame.range_m, steps_per_m_));
+  const auto before = [&](std::size_t x) { return std::min<std::size_t>(x << shift, frame.width); };
+  if (!has_holes_) {
+    // All rows above were whole.
+    for (std::size_t v = 0; v <= y >> shift; ++v)
+      for (std::size_t x = 0; x <= columns; ++x)
+        seen_[v * row + x] = static_cast<std::uint32_t>((v << shift) * before(x));
+    has_holes_ = true;
+  }
+  for (std::size_t x = 0; x < columns; ++x)
+    below[x + 1] = static_cast<std::uint32_t>((before(x + 1) - before(x)) * (bottom - y));
+  const auto look_at = [&](std::size_t u, std::size_t v) {
+    if (frame.depth_m[v * frame.width + u] > frame.range_min_m) return;
+    const float nearest_m = bridged_m(frame, u, v);
+    Entry& entry = tile[u >> shift];
+    if (nearest_m > 0.0F) {
+      entry = min_of(entry, entry_of(nearest_m, frame.range_m, steps_per_m_));
+    } else {
+      --below[(u >> shift) + 1];
     }
+  };
+  for (std::size_t word = 0; word < StripSeen::kWords; ++word) {
+    for (std::uint64_t bits = strip.incomplete[word]; bits != 0; bits &= bits - 1) {
+      const std::size_t first = 512 * word + 8 * static_cast<std::size_t>(std::countr_zero(bits));
+      for (std::size_t v = y; v < bottom; ++v)
+        for (std::size_t u = first; u < std::min<std::size_t>(first + 8, frame.width); ++u) look_at(u, v);
+    }
+  }
+  below[0] = 0;
+  std::uint32_t sum = 0;
+  for (std::size_t x = 1; x <= columns; ++x) {
+    sum += below[x];
+    below[x] = above[x] + sum;
   }
 }
 
 void DepthPyramid::fill_tiles(const firmware_if::DepthFrame& frame, unsigned shift, Entry* tile) noexcept {
   const std::size_t side = std::size_t{1} << shift;
   const std::size_t columns = (frame.width + side - 1) >> shift;
-  informed_count_ = 0;
-  shows_surface_ = false;
+  shows_surface_ = has_holes_ = false;
   for (std::size_t y = 0; y < frame.height; y += side, tile += columns) {
-    const std::size_t rows = std::min(side, frame.height - y);
     const DepthStrip strip{frame.depth_m.data() + y * frame.width,
                            frame.width,
-                           rows,
+                           std::min(side, frame.height - y),
                            frame.range_m,
                            frame.range_min_m,
                            steps_per_m_};
     const StripSeen seen = tile_steps(strip, static_cast<int>(shift), tile);
     shows_surface_ = shows_surface_ || seen.surface;
-    informed_count_ += rows * frame.width;
-    for (std::size_t word = 0; word < StripSeen::kWords; ++word) {
-      for (std::uint64_t bits = seen.incomplete[word]; bits != 0; bits &= bits - 1)
-        bridge_columns(frame, 512 * word + 8 * static_cast<std::size_t>(std::countr_zero(bits)), y, shift,
-                       tile);
-    }
+    const bool whole = std::all_of(seen.incomplete.begin(), seen.incomplete.end(),
+                                   [](std::uint64_t word) { return word == 0; });
+    if (!whole || has_holes_) count_strip(frame, y, shift, seen, tile);
   }
+  shows_anything_ = !has_holes_ || seen_[((frame.height + side - 1) >> shift) * (columns + 1) + columns] > 0;
 }
 
 Status DepthPyramid::build(const firmware_if::DepthFrame& frame, int tile_shift) noexcept {
   if (frame.width > max_width_ || frame.height > max_height_ || memory_.empty()) return Status::kCapacity;
   steps_per_m_ = static_cast<float>(kMaxSteps - 1) / frame.range_m;
+  width_ = frame.width;
+  height_ = frame.height;
   const auto shift = static_cast<unsigned>(std::clamp(tile_shift, 0, 3));
   std::size_t width = (frame.width + (std::size_t{1} << shift) - 1) >> shift;
   std::size_t height = (frame.height + (std::size_t{1} << shift) - 1) >> shift;

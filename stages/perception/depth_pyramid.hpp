@@ -2,6 +2,7 @@
 /// most?
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -12,14 +13,14 @@
 
 namespace roborun::stages {
 
-/// A pixel without information (NaN or not beyond the least range) whose neighbours above, below, left and right all have some
-/// counts as the nearest of them: a camera loses one pixel in 200 at random, and near cells have thousands.
-/// Larger holes see nothing.
+/// A pixel without information (NaN or not beyond the least range) most of whose neighbours have some counts as the nearest of
+/// them: a camera loses some at random, and near cells have thousands. Those of larger holes have no part in bounds; how many
+/// pixels of a rectangle are seen is counted beside them, and only of images with such holes.
 ///
 /// Depths are whole steps of range / 32766, rounded so that bounds stay bounds. Level 0 holds the pixels; an
 /// entry of level k >= 1 covers 2^k x 2^k pixels and they stand 2^(k-1) apart, so that they overlap: any
 /// rectangle of up to 2^k + 2 pixels a side is covered by four of them, with less than 2^(k-1) pixels too
-/// many on each side (none at level 1). Memory from the arena: 7/3 x 4 bytes a pixel.
+/// many on each side (none at level 1). Memory from the arena: 10/3 x 4 bytes a pixel.
 class DepthPyramid {
  public:
   static constexpr int kMaxLevels = 12;  ///< The coarsest covers kMaxImageSide pixels.
@@ -56,24 +57,48 @@ class DepthPyramid {
   /// The tiles, side by side; pixels if tile_shift was 0.
   [[nodiscard]] const Level& tiles() const noexcept { return level_[0]; }
   [[nodiscard]] float steps_per_m() const noexcept { return steps_per_m_; }
-  /// Pixels with information, and whether one of them shows a surface.
-  [[nodiscard]] std::size_t informed_count() const noexcept { return informed_count_; }
+  /// Whether a pixel has information, and whether one shows a surface.
+  [[nodiscard]] bool shows_anything() const noexcept { return shows_anything_; }
+  [[nodiscard]] bool has_holes() const noexcept { return has_holes_; }
+  /// How many of some pixels are not in a hole.
+  struct Share {
+    std::uint32_t seen, pixels;
+  };
+  /// Of the tiles that hold the pixels [u0, u1] x [v0, v1]. Precondition: has_holes(). O(1).
+  [[nodiscard]] Share share(std::int32_t u0, std::int32_t v0, std::int32_t u1,
+                            std::int32_t v1) const noexcept {
+    const auto shift = static_cast<unsigned>(level_[0].shift);
+    const auto x0 = static_cast<std::uint32_t>(u0) >> shift,
+               x1 = (static_cast<std::uint32_t>(u1) >> shift) + 1U;
+    const auto y0 = static_cast<std::uint32_t>(v0) >> shift,
+               y1 = (static_cast<std::uint32_t>(v1) >> shift) + 1U;
+    const std::uint32_t row = static_cast<std::uint32_t>(level_[0].width) + 1U;
+    const std::uint32_t *above = seen_.data() + std::size_t{y0} * row,
+                        *below = seen_.data() + std::size_t{y1} * row;
+    return {
+        below[x1] - below[x0] - above[x1] + above[x0],
+        (std::min(x1 << shift, width_) - (x0 << shift)) * (std::min(y1 << shift, height_) - (y0 << shift))};
+  }
   [[nodiscard]] bool shows_surface() const noexcept { return shows_surface_; }
   /// Pixels [u0, u1] x [v0, v1], inside the image. Conservative. O(1).
   [[nodiscard]] Bound bound(int u0, int v0, int u1, int v1) const noexcept;
 
  private:
-  /// The pixels without information of eight columns from `first` on, in the tiles of the rows from y on.
-  void bridge_columns(const firmware_if::DepthFrame& frame, std::size_t first, std::size_t y, unsigned shift,
-                      Entry* tile) noexcept;
+  /// The strip of tiles from row y on has pixels without information, or one above it has: counts what is seen of it.
+  void count_strip(const firmware_if::DepthFrame& frame, std::size_t y, unsigned shift,
+                   const StripSeen& strip, Entry* tile) noexcept;
   void fill_tiles(const firmware_if::DepthFrame& frame, unsigned shift, Entry* tile) noexcept;
 
   std::size_t max_width_, max_height_;
   float steps_per_m_{0.0F};
-  std::size_t informed_count_{0};
+  bool shows_anything_{false};
   bool shows_surface_{false};
+  bool has_holes_{false};
+  std::uint32_t width_{0}, height_{0};
   std::array<Level, kMaxLevels> level_{};
   std::span<Entry> memory_{};
+  /// Row y, column x: the pixels seen in the tiles above and to the left. A row and a column more than tiles.
+  std::span<std::uint32_t> seen_{};
   core::PoolRecord* pool_{nullptr};
 };
 

@@ -144,21 +144,6 @@ StripSeen tile_steps_lanes(const DepthStrip& strip, int shift, DepthEntry* entry
   return seen;
 }
 
-std::size_t informed_pixels_lanes(std::span<const float> depth_m, float range_min_m) {
-  const Floats d;
-  const Ints di;
-  const std::size_t lanes = hn::Lanes(d);
-  auto informed = hn::Zero(di);
-  std::size_t i = 0;
-  for (; i + lanes <= depth_m.size(); i += lanes) {
-    const auto known = hn::Gt(hn::LoadU(d, depth_m.data() + i), hn::Set(d, range_min_m));
-    informed = hn::Sub(informed, hn::VecFromMask(di, hn::RebindMask(di, known)));
-  }
-  auto count = static_cast<std::size_t>(hn::GetLane(hn::SumOfLanes(di, informed)));
-  for (; i < depth_m.size(); ++i) count += depth_m[i] > range_min_m ? 1U : 0U;
-  return count;
-}
-
 void least_of_four_lanes(const DepthEntry* above, const DepthEntry* below, std::size_t stride,
                          std::size_t count, DepthEntry* to) {
   const auto least = [](DepthEntry a, DepthEntry b) {
@@ -189,15 +174,10 @@ HWY_AFTER_NAMESPACE();
 namespace roborun::stages {
 
 HWY_EXPORT(tile_steps_lanes);
-HWY_EXPORT(informed_pixels_lanes);
 HWY_EXPORT(least_of_four_lanes);
 
 StripSeen tile_steps(const DepthStrip& strip, int shift, DepthEntry* entry) noexcept {
   return HWY_DYNAMIC_DISPATCH(tile_steps_lanes)(strip, shift, entry);
-}
-
-std::size_t informed_pixels(std::span<const float> depth_m, float range_min_m) noexcept {
-  return HWY_DYNAMIC_DISPATCH(informed_pixels_lanes)(depth_m, range_min_m);
 }
 
 void least_of_four(const DepthEntry* above, const DepthEntry* below, std::size_t stride, std::size_t count,

@@ -24,7 +24,7 @@ inline constexpr std::size_t kMaxImageSide = 1280;  ///< Pixels.
 struct DepthEntry {
   static constexpr std::int32_t kMaxSteps = 32767;  ///< "Nothing within the range".
 
-  std::int16_t least_steps;     ///< No pixel sees less far; 0 if one has no information.
+  std::int16_t least_steps;     ///< No pixel with information sees less far.
   std::int16_t not_most_steps;  ///< kMaxSteps minus what no pixel sees beyond.
 };
 
@@ -52,8 +52,5 @@ struct StripSeen {
 /// Sets to[x] to the least of stride x and stride x + stride of both rows, for x < count. RT-safe: O(count).
 void least_of_four(const DepthEntry* above, const DepthEntry* below, std::size_t stride, std::size_t count,
                    DepthEntry* to) noexcept;
-
-/// Returns how many pixels of an image have information: are beyond range_min_m. RT-safe: O(pixels).
-[[nodiscard]] std::size_t informed_pixels(std::span<const float> depth_m, float range_min_m) noexcept;
 
 }  // namespace roborun::stages

@@ -30,9 +30,27 @@ double seconds_between(MonotonicTime from, MonotonicTime to) noexcept {
   return seconds(to.time_since_epoch()) - seconds(from.time_since_epoch());
 }
 
-bool is_informed(const PosedDepthFrame& posed, std::size_t informed_count) noexcept {
-  const auto pixels = static_cast<double>(posed.frame.depth_m.size());
-  return static_cast<double>(informed_count) >= (posed.is_cloud ? 0.0 : kLeastInformedRatio * pixels);
+/// See kLeastInformedRatio.
+bool is_informed(const PosedDepthFrame& posed) noexcept {
+  if (posed.is_cloud) return true;
+  constexpr std::size_t kSide = 16;
+  const firmware_if::DepthFrame& f = posed.frame;
+  std::size_t down = 0, informed = 0;
+  for (std::size_t j = 0; j < kSide; ++j) {
+    for (std::size_t i = 0; i < kSide; ++i) {
+      const auto middle = [](std::size_t n, std::size_t pixels) {
+        return (2 * n + 1) * pixels / (2 * kSide);
+      };
+      const std::size_t u = middle(i, f.width), v = middle(j, f.height);
+      const Vector3 ray_C(
+          1.0, (1.0 - (2.0 * static_cast<double>(u) + 1.0) / f.width) * static_cast<double>(f.tan_half_width),
+          (1.0 - (2.0 * static_cast<double>(v) + 1.0) / f.height) * static_cast<double>(f.tan_half_height));
+      if (posed.X_WC.R_RT.row(2).dot(ray_C) > -kDownwards * ray_C.norm()) continue;
+      ++down;
+      informed += f.depth_m[v * f.width + u] > f.range_min_m ? 1U : 0U;
+    }
+  }
+  return static_cast<double>(informed) >= kLeastInformedRatio * static_cast<double>(down);
 }
 
 }  // namespace
@@ -52,9 +70,10 @@ Status check_shape(const PosedDepthFrame& posed) noexcept {
 
 Status check_frame(const PosedDepthFrame& posed) noexcept {
   if (check_shape(posed) != Status::kOk) return Status::kInvalidArgument;
-  return is_informed(posed, informed_pixels(posed.frame.depth_m, posed.frame.range_min_m))
-             ? Status::kOk
-             : Status::kInvalidArgument;
+  const auto& depth_m = posed.frame.depth_m;
+  const bool any =
+      std::any_of(depth_m.begin(), depth_m.end(), [&](float d) { return d > posed.frame.range_min_m; });
+  return any && is_informed(posed) ? Status::kOk : Status::kInvalidArgument;
 }
 
 void FrameGuard::begin(std::span<const PosedDepthFrame> scan) noexcept {
@@ -85,14 +104,14 @@ bool FrameGuard::frozen(const firmware_if::DepthFrame& frame) noexcept {
 }
 
 Status FrameGuard::check(const PosedDepthFrame& posed) noexcept {
-  if (check_shape(posed) != Status::kOk) return Status::kInvalidArgument;
-  return check(posed, informed_pixels(posed.frame.depth_m, posed.frame.range_min_m));
+  return check_shape(posed) == Status::kOk ? check_content(posed) : Status::kInvalidArgument;
 }
 
-Status FrameGuard::check(const PosedDepthFrame& posed, std::size_t informed_count) noexcept {
+Status FrameGuard::check_content(const PosedDepthFrame& posed) noexcept {
   const double late_s = seconds_between(scan_, posed.frame.stamp);
   const bool in_time = !scan_too_old_ && std::fabs(late_s) <= seconds(kStampSpread);
-  if (!in_time || !is_informed(posed, informed_count) || frozen(posed.frame)) return Status::kInvalidArgument;
+  const bool has_noise = posed.error.constant_m > 0.0 || posed.error.quadratic_per_m > 0.0;
+  if (!in_time || !is_informed(posed) || (has_noise && frozen(posed.frame))) return Status::kInvalidArgument;
   return Status::kOk;
 }
 

@@ -11,23 +11,24 @@
 
 namespace roborun::stages {
 
-/// A half frame has at most half of its pixels; a good one loses some in a hundred.
-inline constexpr double kLeastInformedRatio = 0.6;
+/// Of the pixels that look at least kDownwards (sine) below the horizon, this part at least has information in a good frame: half
+/// of stereo's may have none. Sky without values is ordinary, and so is a sensor of which no pixel looks down.
+inline constexpr double kLeastInformedRatio = 0.25;
+inline constexpr double kDownwards = 0.26;
 
 /// kOk if a frame can be read: 8..1280 pixels a side, as many depths as pixels, range in (0, kMaxRange_m], least
 /// range in [0, range), both tangents of the field of view in (0, kMaxTanHalfFov], finite pose. Otherwise kInvalidArgument. RT-safe: O(1).
 [[nodiscard]] Status check_shape(const PosedDepthFrame& posed) noexcept;
-/// kOk if a frame may be used at all: check_shape(), and at least kLeastInformedRatio of the pixels (of a
-/// cloud: none) with information. Otherwise kInvalidArgument: black, NaN, half, wrong size. RT-safe:
-/// O(pixels).
+/// kOk if a frame may be used at all: check_shape(), a pixel with information, and enough of those that look down (of a
+/// cloud: none). Otherwise kInvalidArgument: black, NaN, the lower half missing, wrong size. RT-safe: O(pixels).
 [[nodiscard]] Status check_frame(const PosedDepthFrame& posed) noexcept;
 
 /// check_frame(), and what only the frames before can tell:
 ///  - stamps: a frame more than kStampSpread from the middle one of its scan, or a scan that much older than
 ///    the one before it, is refused. (Twice as old in a row is believed: the clock was set.)
 ///  - frozen: 64 pixels spread over the image, 8 of them or more showing a surface, that are bit-equal to
-///    those of a remembered frame of another stamp. Noise makes that impossible. An image without surfaces
-///    may repeat.
+///    those of a remembered frame of another stamp. Noise makes that impossible; a camera without (DepthError), and an
+///    image without surfaces, may repeat.
 /// White, "nothing within the range" everywhere, is what an open sky looks like: BrickMap refuses it where it
 /// knows of a surface.
 class FrameGuard {
@@ -36,11 +37,11 @@ class FrameGuard {
 
   /// To be called once a scan, before check(). RT-safe: O(frames).
   void begin(std::span<const PosedDepthFrame> scan) noexcept;
-  /// kOk or kInvalidArgument. The same frame again is no frozen one. RT-safe: O(pixels).
+  /// kOk or kInvalidArgument. The same frame again is no frozen one, and an image of nothing but sky may be empty. RT-safe:
+  /// O(1).
   [[nodiscard]] Status check(const PosedDepthFrame& posed) noexcept;
-  /// The same for who has counted the pixels with information. Precondition: check_shape() is
-  /// kOk. RT-safe: O(1).
-  [[nodiscard]] Status check(const PosedDepthFrame& posed, std::size_t informed_count) noexcept;
+  /// The same for who knows that check_shape() is kOk.
+  [[nodiscard]] Status check_content(const PosedDepthFrame& posed) noexcept;
 
  private:
   struct Print {

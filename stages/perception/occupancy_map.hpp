@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/depth_error.hpp"
 #include "core/executive/stage_budget.hpp"
 #include "core/geometry/vector.hpp"
 #include "firmware_if/depth_camera.hpp"
@@ -17,6 +18,7 @@ namespace roborun::stages {
 struct PosedDepthFrame {
   firmware_if::DepthFrame frame{};
   Pose X_WC{};
+  DepthError error{};    ///< Of this camera.
   bool is_cloud{false};  ///< Made from a cloud (cloud_images.hpp): most pixels may have no information.
   Vector3 p_BC_W = Vector3::Zero();  ///< From the middle of the vehicle to the camera, at that instant.
 };
@@ -47,8 +49,8 @@ struct ExportRequest {
 };
 
 /// Contract (proved on every implementation by tests/stages/perception/occupancy_map_contract_test.cpp):
-///  1. Space never seen is unknown. A frame that was refused and a hole of NaN pixels change nothing.
-///     (A single lost pixel among valid neighbours counts as the nearest of them.)
+///  1. Space never seen is unknown. A frame that was refused and a hole of NaN pixels change nothing: what lies
+///     behind a hole is neither free nor occupied.
 ///  2. After one integration at level 0 of a clean frame, the cells that a ray crossed well before its end
 ///     are free, and the cell at its end (or a face neighbour) is occupied.
 ///  3. A free write at a coarse level never clears a finer cell in which a surface was seen in this scan.

@@ -1,11 +1,11 @@
 #include "stages/perception/sight_camera.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace roborun::stages {
 
-void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& image,
-                          const Margin& depth_margin) noexcept {
+void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& image) noexcept {
   const Matrix3 R = posed.X_WC.R_RT.transpose();
   const auto across = static_cast<double>(posed.frame.tan_half_width);
   const auto along = static_cast<double>(posed.frame.tan_half_height);
@@ -33,8 +33,11 @@ void SightCamera::prepare(const PosedDepthFrame& posed, const DepthPyramid& imag
   rows_per_tan = static_cast<float>(0.5 * posed.frame.height / along);
   last_column = static_cast<float>(posed.frame.width - 1);
   last_row = static_cast<float>(posed.frame.height - 1);
-  margin_m = static_cast<float>(depth_margin.constant_m);
-  margin_quadratic_per_m = static_cast<float>(depth_margin.quadratic_per_m);
+  margin_m = static_cast<float>(kLeast_m + kSigmas * (posed.error.constant_m + posed.error.place_m));
+  margin_quadratic_per_m =
+      static_cast<float>(std::max(kSigmas * posed.error.quadratic_per_m, kLeastQuadratic_per_m));
+  widening = static_cast<float>(kSigmasAside * posed.error.angle_rad);
+  widening_m = static_cast<float>(kSigmasAside * posed.error.place_m);
   pyramid = &image;
 }
 

@@ -12,13 +12,13 @@ inline constexpr std::size_t kMaxCameras = 8;
 
 /// What the kernels read of a camera. Single precision: positions are relative to the camera.
 struct SightCamera {
-  /// A block is free only if every pixel sees constant_m + quadratic_per_m * depth^2 past it: stereo's error
-  /// grows with the square of the depth.
-  struct Margin {
-    double constant_m{};
-    double quadratic_per_m{};
-  };
-  void prepare(const PosedDepthFrame& posed, const DepthPyramid& image, const Margin& depth_margin) noexcept;
+  /// Of the margin, what is there whatever the errors are.
+  static constexpr double kLeast_m = 0.035;
+  /// A pixel is no ray: within it, ground at a grazing angle is nearer and farther.
+  static constexpr double kLeastQuadratic_per_m = 0.0012;
+  static constexpr double kSigmas = 3.0;
+  static constexpr double kSigmasAside = 2.0;
+  void prepare(const PosedDepthFrame& posed, const DepthPyramid& image) noexcept;
 
   Vector3 p_WC = Vector3::Zero();
   std::array<float, 9> R_CW{};  ///< Row-major.
@@ -29,7 +29,10 @@ struct SightCamera {
   std::array<float, 4> support{};
   float tan_half_width{}, tan_half_height{}, range_m{};
   float columns_per_tan{}, rows_per_tan{}, last_column{}, last_row{};
+  /// A block is free only if pixels see margin_m + margin_quadratic_per_m * depth^2 past it.
   float margin_m{}, margin_quadratic_per_m{};
+  /// So much farther to all sides: widening + widening_m / depth, as a tangent.
+  float widening{}, widening_m{};
   const DepthPyramid* pyramid{};
 };
 

@@ -169,11 +169,23 @@ TEST(VehicleFile, NothingAboutAVehicleIsAssumed) {
   const std::string x500 = kShippedVehicles[1].text;
   ASSERT_EQ(refusal(x500), "");
   for (const VehicleKey& key : kVehicleKeys) {
+    if (key.optional) continue;
     const std::string line = std::string("\n") + key.key + " = ";
     const std::string said = refusal(replaced(x500, line, "\n#"));
     EXPECT_NE(said.find(key.key), std::string::npos) << said;
     EXPECT_NE(said.find("missing"), std::string::npos) << said;
   }
+}
+
+TEST(VehicleFile, TheThinnestThingMayBeLeftOut) {
+  const std::string x500 = kShippedVehicles[1].text;
+  EXPECT_EQ(vehicle_from_toml("x.toml", x500).model.thinnest_m, 0.02);
+  EXPECT_EQ(
+      vehicle_from_toml("x.toml", replaced(x500, "[limits]", "[limits]\nthinnest_m = 0.1")).model.thinnest_m,
+      0.1);
+  EXPECT_NE(refusal(replaced(x500, "[limits]", "[limits]\nthinnest_m = 0"))
+                .find("thinnest_m: must be a number from 0.005 to 1"),
+            std::string::npos);
 }
 
 TEST(VehicleFile, SaysFileLineKeyAndRange) {

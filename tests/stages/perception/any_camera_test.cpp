@@ -238,6 +238,9 @@ TEST(WidePyramid, BoundsEveryRectangleOfTheLargestImage) {
     depth[at] = i % 2 == 0 ? kNan : 0.2F;
     if (at + 1281 < depth.size() && i % 5 == 0) depth[at + 1] = depth[at + 1280] = kNan;
   }
+  for (std::size_t v = 100; v < 140; ++v)  // a hole
+    std::fill_n(depth.begin() + static_cast<std::ptrdiff_t>(1280 * v + 300), 57, kNan);
+  {}
   firmware_if::DepthFrame frame;
   frame.width = 1280;
   frame.height = 720;
@@ -250,18 +253,38 @@ TEST(WidePyramid, BoundsEveryRectangleOfTheLargestImage) {
   core::Arena arena(block);
   DepthPyramid sut(arena, 1280, 720);
   ASSERT_FALSE(arena.exhausted());
-  std::size_t informed = 0;
-  for (const float d : depth) informed += d > 0.3F ? 1U : 0U;
+  // Not in a hole: has information, or most of the pixels around it have.
+  std::vector<bool> seen(depth.size());
+  for (int v = 0; v < 720; ++v)
+    for (int u = 0; u < 1280; ++u) {
+      int pixels = 0, known = 0;
+      for (int y = std::max(v - 1, 0); y <= std::min(v + 1, 719); ++y)
+        for (int x = std::max(u - 1, 0); x <= std::min(u + 1, 1279); ++x, ++pixels)
+          known += depth[static_cast<std::size_t>(y * 1280 + x)] > 0.3F ? 1 : 0;
+      seen[static_cast<std::size_t>(v * 1280 + u)] =
+          depth[static_cast<std::size_t>(v * 1280 + u)] > 0.3F || 2 * known > pixels;
+    }
   for (int n = 0; n < 400; ++n) {
     if (n % 100 == 0) {
       ASSERT_EQ(sut.build(frame, n / 100), Status::kOk);
-      ASSERT_EQ(sut.informed_count(), informed);
+      ASSERT_TRUE(sut.has_holes() && sut.shows_anything());
     }
     const int wide = n % 10 == 0 ? 1280 : 60;
     const int u0 = static_cast<int>(rng.below(1280)), v0 = static_cast<int>(rng.below(720));
     const int u1 = std::min(1279, u0 + static_cast<int>(rng.below(static_cast<std::uint64_t>(wide)))),
               v1 = std::min(719, v0 + static_cast<int>(rng.below(static_cast<std::uint64_t>(wide))));
     const DepthPyramid::Bound bound = sut.bound(u0, v0, u1, v1);
+    const int side = 1 << (n / 100);
+    const DepthPyramid::Share share = sut.share(u0, v0, u1, v1);
+    DepthPyramid::Share counted{};
+    for (int v = v0 / side * side; v < std::min((v1 / side + 1) * side, 720); ++v) {
+      for (int u = u0 / side * side; u < std::min((u1 / side + 1) * side, 1280); ++u) {
+        ++counted.pixels;
+        counted.seen += seen[static_cast<std::size_t>(v) * 1280 + static_cast<std::size_t>(u)] ? 1U : 0U;
+      }
+    }
+    ASSERT_EQ(share.pixels, counted.pixels);
+    ASSERT_EQ(share.seen, counted.seen);
     for (int v = v0; v <= v1; ++v) {
       for (int u = u0; u <= u1; ++u) {
         const float d = depth[static_cast<std::size_t>(v) * 1280 + static_cast<std::size_t>(u)];

@@ -135,7 +135,7 @@ TEST_F(BlockSight, ABlockIsFreeOnlyIfEveryRayThroughItSeesPastIt) {
   DepthPyramid image(arena, 45, 45);
   ASSERT_EQ(image.build(frames_[0].frame), Status::kOk);
   SightCameras cameras;
-  cameras.camera[0].prepare(frames_[0], image, {0.05, 0.0012});
+  cameras.camera[0].prepare(frames_[0], image);
   cameras.count = 1;
   cameras.complete = false;
   core::CounterRng rng(5);
@@ -196,7 +196,7 @@ TEST_F(BlockSight, ABrickIsSeenAsItsBlocksOneByOne) {
     const PosedDepthFrame& frame = frames_[cameras.count];
     image[cameras.count].emplace(arena, 45, 45);
     ASSERT_EQ(image[cameras.count]->build(frame.frame), Status::kOk);
-    cameras.camera[cameras.count].prepare(frame, *image[cameras.count], {0.05, 0.0012});
+    cameras.camera[cameras.count].prepare(frame, *image[cameras.count]);
   }
   core::CounterRng rng(6);
   auto seen = std::make_unique<BrickSeen>();

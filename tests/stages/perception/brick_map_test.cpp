@@ -13,16 +13,18 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+/// All that a cell can hold.
+constexpr std::array<unsigned, 14> kStates{0, 1, 2, 3, 5, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+
 TEST(Brick, MipsSayWhatTheCellsSay) {
   core::CounterRng rng(1);
   auto sut = std::make_unique<Brick>();
   sut->fill(evidence::kUnknown);
   std::size_t known = 0;
   for (std::uint32_t m = 0; m < kCellsPerBrick; ++m) {
-    const auto kind = rng.below(30);
-    if (kind > 0)
-      sut->set_cell(m, kind < 9 ? evidence::kOccupied + static_cast<unsigned>(kind) : evidence::kFree);
-    known += kind > 0 ? 1U : 0U;
+    const auto kind = static_cast<unsigned>(rng.below(30));
+    sut->set_cell(m, kind < kStates.size() ? kStates[kind] : evidence::kFree);
+    known += sut->cell(m) != evidence::kUnknown && sut->cell(m) != evidence::kPartlyFree ? 1U : 0U;
   }
   sut->refresh();
   EXPECT_EQ(sut->known_count, known);
@@ -52,14 +54,34 @@ TEST(Brick, EvidenceIsBounded) {
   EXPECT_EQ(looks_until_free(cell), 8);
 }
 
+TEST(Brick, TwoLooksPastAPartAreALookPastAllOfIt) {
+  unsigned cell = evidence::after_miss(evidence::kUnknown, {.in_part = true});
+  EXPECT_EQ(cell, evidence::kPartlyFree);
+  EXPECT_FALSE(evidence::is_occupied(cell));
+  EXPECT_EQ(evidence::after_miss(cell), evidence::kFree);
+  EXPECT_EQ(evidence::after_miss(cell, {.in_part = true}), evidence::kFree);
+  EXPECT_EQ(evidence::after_miss(evidence::kFree, {.in_part = true}), evidence::kFree)
+      << "what is free stays so";
+  EXPECT_TRUE(evidence::is_occupied(evidence::after_hit(cell)));
+}
+
+TEST(Brick, OnlyLooksThatWouldHaveMetItTakeFromWhatIsThin) {
+  unsigned cell = evidence::kThin;
+  for (int i = 0; i < 100; ++i) cell = evidence::after_miss(cell);
+  EXPECT_EQ(cell, evidence::kThin);
+  for (int i = 0; i < 2; ++i) cell = evidence::after_miss(cell, {.of_the_thin = true});
+  EXPECT_TRUE(evidence::is_occupied(cell));
+  EXPECT_EQ(evidence::after_hit(cell), evidence::kThin) << "seen again";
+  EXPECT_EQ(evidence::after_miss(cell, {.of_the_thin = true}), evidence::kFree);
+}
+
 TEST(Brick, FreesBlocksAsItWouldTheirCells) {
   core::CounterRng rng(7);
   auto sut = std::make_unique<Brick>(), by_cell = std::make_unique<Brick>();
   for (int level = 0; level <= kBrickLevel; ++level) {
     for (int n = 0; n < 50; ++n) {
       for (std::uint32_t m = 0; m < kCellsPerBrick; ++m) {
-        const auto kind = static_cast<unsigned>(rng.below(16));
-        const unsigned cell = kind > evidence::kOccupied ? kind : kind % 2;
+        const unsigned cell = kStates[rng.below(kStates.size())];
         sut->set_cell(m, cell);
         by_cell->set_cell(m, cell);
       }
@@ -67,11 +89,12 @@ TEST(Brick, FreesBlocksAsItWouldTheirCells) {
       const auto parent =
           static_cast<std::uint32_t>(level < kBrickLevel ? rng.below(kCellsPerBrick / size / 8) : 0);
       const auto blocks = static_cast<std::uint8_t>(level < kBrickLevel ? rng.below(256) : 1);
-      sut->add_free(level, parent, blocks);
+      const evidence::Past past{n % 2 == 1, n % 4 > 1};
+      sut->add_free(level, parent, blocks, past);
       for (std::uint32_t i = 0; i < 8; ++i) {
         if (((blocks >> i) & 1) == 0) continue;
         for (std::uint32_t m = (8 * parent + i) * size; m < (8 * parent + i + 1) * size; ++m)
-          by_cell->set_cell(m, evidence::after_miss(by_cell->cell(m)));
+          by_cell->set_cell(m, evidence::after_miss(by_cell->cell(m), past));
       }
       ASSERT_EQ(sut->word, by_cell->word) << level;
     }

@@ -57,8 +57,7 @@ TEST(BrickMapConfigDeathTest, OnlyValidOnesAreMade) {
        {"rows", [](Config& c) { c.max_image_height = 7; }},
        {"more all around than there are", [](Config& c) { c.all_around_frames = c.max_frames + 1; }},
        {"radius", [](Config& c) { c.vehicle_radius_m = -0.1; }},
-       {"margin", [](Config& c) { c.depth_margin_m = kNan; }},
-       {"quadratic margin", [](Config& c) { c.depth_margin_quadratic_per_m = -0.1; }}});
+       {"thinnest", [](Config& c) { c.thinnest_m = kNan; }}});
 }
 
 TEST(SpaceProfilerConfigDeathTest, OnlyValidOnesAreUsed) {

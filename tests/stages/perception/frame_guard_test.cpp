@@ -74,6 +74,34 @@ TEST_F(FrameGuardTest, AnOpenSkyMayRepeat) {
   }
 }
 
+/// A stereo camera has no values on sky: forward, the upper half of an image; upwards, all of it.
+TEST_F(FrameGuardTest, SkyWithoutValuesIsOrdinary) {
+  Shot shot(scene_, 1.0);
+  for (std::size_t i = 0; i < 4; ++i)
+    std::fill(shot.image[i].begin(),
+              shot.image[i].begin() + static_cast<std::ptrdiff_t>(shot.image[i].size() / 2), kNan);
+  shot.image[4].assign(shot.image[4].size(), kNan);
+  ASSERT_GT(shot.frames[4].X_WC.R_RT(2, 0), 0.9) << "looks up";
+  EXPECT_EQ(refused(shot.frames), 0);
+  shot.image[5].assign(shot.image[5].size(), kNan);
+  EXPECT_EQ(refused(shot.frames), 1) << "where the ground should be";
+}
+
+TEST_F(FrameGuardTest, AStillCameraWithoutNoiseIsNotFrozen) {
+  const Shot first(scene_, 1.0);
+  for (int n = 0; n < 5; ++n) {
+    Shot next(scene_, 1.0 + 0.1 * n);
+    EXPECT_EQ(refused(next.frames), n == 0 ? 0 : 5) << "noise never repeats; sky may";
+  }
+  FrameGuard fresh;
+  sut_ = fresh;
+  for (int n = 0; n < 5; ++n) {
+    Shot next(scene_, 1.0 + 0.1 * n);
+    for (PosedDepthFrame& f : next.frames) f.error = {0.0, 0.0};
+    EXPECT_EQ(refused(next.frames), 0) << n;
+  }
+}
+
 TEST_F(FrameGuardTest, RefusesFramesOfAnotherTime) {
   Shot shot(scene_, 10.0);
   shot.frames[2].frame.stamp = at_s(9.7);

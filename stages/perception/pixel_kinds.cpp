@@ -1,0 +1,122 @@
+// See pixel_kinds.hpp.
+// Compiled once per instruction set: foreach_target includes this file again.
+#include "stages/perception/instruction_sets.hpp"
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "stages/perception/pixel_kinds.cpp"
+#include <hwy/foreach_target.h>
+// After foreach_target.
+#include <hwy/highway.h>
+
+#include <limits>
+
+#include "stages/perception/pixel_kinds.hpp"
+#include "stages/perception/vector_lanes.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace roborun::stages::HWY_NAMESPACE {
+
+/// Depths of three rows, with one pixel more on both sides: NaN where there is no information or no pixel, and far away where
+/// nothing is within the range.
+struct ThreeRows {
+  static constexpr std::size_t kBefore = 8;
+  alignas(32) float row[3][kBefore + kMaxImageSide + 2 * PixelRow::kPad];
+};
+
+HWY_INLINE void load_rows(const firmware_if::DepthFrame& frame, std::size_t v, std::size_t u0, std::size_t u1,
+                          ThreeRows& rows) {
+  const Floats d;
+  const std::size_t lanes = hn::Lanes(d), count = u1 - u0;
+  const auto none = hn::Set(d, std::numeric_limits<float>::quiet_NaN());
+  for (std::size_t k = 0; k < 3; ++k) {
+    float* const to = rows.row[k] + ThreeRows::kBefore;
+    const std::size_t y = v + k - 1;  // wraps below 0: no row either
+    const bool is_there = y < frame.height;
+    const float* const from = frame.depth_m.data() + (is_there ? y : 0) * frame.width + u0;
+    const auto known = [&](auto raw) {
+      const auto far =
+          hn::IfThenElse(hn::Lt(raw, hn::Set(d, frame.range_m)), raw, hn::Set(d, 2.0F * kMaxRange_m));
+      return hn::IfThenElse(hn::Gt(raw, hn::Set(d, frame.range_min_m)), far, none);
+    };
+    std::size_t u = 0;
+    for (; is_there && u + lanes <= count; u += lanes) hn::StoreU(known(hn::LoadU(d, from + u)), d, to + u);
+    const auto one = [&](std::size_t i) {
+      const float raw = from[i];
+      if (!(raw > frame.range_min_m)) return std::numeric_limits<float>::quiet_NaN();
+      return raw < frame.range_m ? raw : 2.0F * kMaxRange_m;
+    };
+    for (; u < count; ++u) to[u] = is_there ? one(u) : std::numeric_limits<float>::quiet_NaN();
+    to[-1] = is_there && u0 > 0 ? frame.depth_m[y * frame.width + u0 - 1] : 0.0F;
+    to[count] = is_there && u1 < frame.width ? frame.depth_m[y * frame.width + u1] : 0.0F;
+    for (float* const side : {to - 1, to + count}) {
+      if (!(*side > frame.range_min_m)) *side = std::numeric_limits<float>::quiet_NaN();
+      if (*side >= frame.range_m) *side = 2.0F * kMaxRange_m;
+    }
+    for (std::size_t i = 1; i <= PixelRow::kPad; ++i) to[count + i] = std::numeric_limits<float>::quiet_NaN();
+  }
+}
+
+void tell_pixels_lanes(const firmware_if::DepthFrame& frame, std::size_t v, std::size_t u0, std::size_t u1,
+                       const PixelRules& rules, PixelRow& row) {
+  const Floats d;
+  const std::size_t lanes = hn::Lanes(d), count = u1 - u0;
+  ThreeRows rows;
+  load_rows(frame, v, u0, u1, rows);
+  row.any_thin = false;
+  row.thin.fill(0);
+  for (std::size_t u = 0; u < count; u += lanes) {
+    const float* const here = rows.row[1] + ThreeRows::kBefore + u;
+    const float* const above = rows.row[0] + ThreeRows::kBefore + u;
+    const float* const below = rows.row[2] + ThreeRows::kBefore + u;
+    const auto z = hn::LoadU(d, here);
+    const auto is_surface = hn::Lt(z, hn::Set(d, frame.range_m));
+    const auto t =
+        hn::Add(hn::Set(d, rules.constant_m), hn::Mul(hn::Set(d, rules.quadratic_per_m), hn::Mul(z, z)));
+    const auto low = hn::Sub(z, t), high = hn::Add(z, t);
+    const auto depth = hn::IfThenElseZero(is_surface, z);
+    const auto at = [&](const float* p) { return hn::LoadU(d, p); };
+    const auto shares = [&](auto n) { return hn::And(hn::Ge(n, low), hn::Le(n, high)); };
+    const auto left = at(here - 1), right = at(here + 1), up = at(above), down = at(below);
+    const auto beside = hn::Or(shares(left), shares(right)), along = hn::Or(shares(up), shares(down));
+    if (hn::AllTrue(d, hn::Or(hn::And(beside, along), hn::Not(is_surface)))) {
+      hn::StoreU(depth, d, row.depth_m.data() + u);
+      continue;
+    }
+    const auto lone =
+        hn::Not(hn::Or(hn::Or(beside, along), hn::Or(hn::Or(shares(at(above - 1)), shares(at(above + 1))),
+                                                     hn::Or(shares(at(below - 1)), shares(at(below + 1))))));
+    const auto any = [&](const auto& is) {
+      return hn::Or(
+          hn::Or(hn::Or(is(left), is(right)), hn::Or(is(up), is(down))),
+          hn::Or(hn::Or(is(at(above - 1)), is(at(above + 1))), hn::Or(is(at(below - 1)), is(at(below + 1)))));
+    };
+    const auto nearer = [&](auto n) { return hn::Lt(n, low); };
+    const auto farther = [&](auto n) { return hn::Gt(n, high); };
+    const auto mixes = hn::Lt(hn::Zero(d), hn::Set(d, rules.mixes ? 1.0F : 0.0F));
+    const auto mixed = hn::And(hn::And(mixes, lone), hn::And(any(nearer), any(farther)));
+    hn::StoreU(hn::IfThenElse(mixed, hn::Zero(d), depth), d, row.depth_m.data() + u);
+    const auto stands_out = [&](auto a, auto b) {
+      return hn::And(hn::Not(hn::Or(hn::Le(a, high), hn::Le(b, high))), hn::Or(farther(a), farther(b)));
+    };
+    const auto thin =
+        hn::AndNot(mixed, hn::And(is_surface, hn::Or(stands_out(left, right), stands_out(up, down))));
+    const std::uint64_t bits = bits_of(thin);
+    row.any_thin = row.any_thin || bits != 0;
+    row.thin[u / 64] |= bits << (u % 64);
+  }
+}
+
+}  // namespace roborun::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace roborun::stages {
+
+HWY_EXPORT(tell_pixels_lanes);
+
+void tell_pixels(const firmware_if::DepthFrame& frame, std::size_t v, std::size_t u0, std::size_t u1,
+                 const PixelRules& rules, PixelRow& row) noexcept {
+  HWY_DYNAMIC_DISPATCH(tell_pixels_lanes)(frame, v, u0, u1, rules, row);
+}
+
+}  // namespace roborun::stages
+#endif  // HWY_ONCE

@@ -1,0 +1,35 @@
+/// What the pixels of a row show, by their neighbours: a surface, something thin, or nothing that is there.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "firmware_if/depth_camera.hpp"
+#include "stages/perception/depth_steps.hpp"
+
+namespace roborun::stages {
+
+/// Two pixels are at one depth if they differ by no more than constant_m + quadratic_per_m z^2. `mixes`: DepthError.
+struct PixelRules {
+  float constant_m{}, quadratic_per_m{};
+  bool mixes{};
+};
+
+/// Some pixels of a row.
+struct PixelRow {
+  static constexpr std::size_t kPad = 8;  ///< Room for whole vectors.
+  /// 0: no surface, or, of a camera that mixes, a pixel between two depths that no neighbour shares: it saw a bit of both, and
+  /// nothing is where it ends.
+  alignas(32) std::array<float, kMaxImageSide + kPad> depth_m{};
+  /// Bit i of all words: pixel i is nearer than both pixels beside it, or above and below it, by a step. (One of them may have
+  /// no information.)
+  std::array<std::uint64_t, kMaxImageSide / 64 + 1> thin{};
+  bool any_thin{};
+};
+
+/// Fills `row` with the pixels [u0, u1) of row v. Preconditions: a good shape (check_shape()), u0 < u1. RT-safe: O(pixels).
+void tell_pixels(const firmware_if::DepthFrame& frame, std::size_t v, std::size_t u0, std::size_t u1,
+                 const PixelRules& rules, PixelRow& row) noexcept;
+
+}  // namespace roborun::stages
