@@ -18,6 +18,10 @@ constexpr Nanos kIdlePeriod{100'000'000};  // of reports while there is nothing 
 constexpr double kHover_mps = 0.3;
 constexpr Nanos kLatestStop{20'000'000};  // 12 cm at 6 m/s
 
+bool looks_down(const stages::PosedDepthFrame& posed) noexcept {
+  return posed.X_WC.R_RT(2, 0) < -0.7;  // of its optical axis
+}
+
 }  // namespace
 
 DecisionProgram::DecisionProgram(const Config& config, DecisionPipeline& pipeline,
@@ -94,7 +98,7 @@ void DecisionProgram::look_through_lidar(std::size_t lidar, const stages::PastSt
   }
 }
 
-void DecisionProgram::look(const stages::PastStates& past, MonotonicTime now) noexcept {
+void DecisionProgram::look(const stages::PastStates& past, bool airborne, MonotonicTime now) noexcept {
   frames_.clear();
   look_through_cameras(past);
   for (std::size_t i = 0; i < lidars_.size(); ++i) look_through_lidar(i, past);
@@ -104,9 +108,12 @@ void DecisionProgram::look(const stages::PastStates& past, MonotonicTime now) no
   in_.scans.clear();
   std::array<std::size_t, 1 + kMostLidars> scan{};
   for (std::size_t i = 0; i < frames_.size(); ++i) {
-    if (guard_.check(frames_[i]) != Status::kOk) continue;
     const std::size_t sensor = sensor_of_[i];
-    last_usable_[sensor] = frames_[i].frame.stamp;
+    const bool usable = guard_.check(frames_[i]) == Status::kOk;
+    // From the ground, a camera that looks down sees nothing: all of it is nearer than its least range.
+    const bool may_be_dark = !airborne && frames_[i].frame.range_min_m > 0.0F && looks_down(frames_[i]);
+    if (usable || may_be_dark) last_usable_[sensor] = frames_[i].frame.stamp;
+    if (!usable) continue;
     ++scan[sensor < kMostCameras ? 0 : 1 + sensor - kMostCameras];
     frames_[kept++] = frames_[i];
   }
@@ -131,7 +138,7 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
     lane.end_frame();
     return;
   }
-  look(report.past, lane.release());
+  look(report.past, report.airborne, lane.release());
   publish(lane.release() + kIdlePeriod);
   if (frames_.empty()) {
     lane.set_period(4 * core::kMinorFrame);

@@ -49,7 +49,7 @@ class DecisionProgram final : public core::LaneProgram {
   void gather(core::LaneExecutive& lane) noexcept;
   /// Reads all sensors: frames_ are the images that may be used, and the depth's age is that of the sensor
   /// that is worst off.
-  void look(const stages::PastStates& past, MonotonicTime now) noexcept;
+  void look(const stages::PastStates& past, bool airborne, MonotonicTime now) noexcept;
   /// Adds the newest images of all cameras, or those of a LiDAR's newest sweep.
   void look_through_cameras(const stages::PastStates& past) noexcept;
   void look_through_lidar(std::size_t lidar, const stages::PastStates& past) noexcept;

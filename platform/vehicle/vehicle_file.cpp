@@ -49,7 +49,6 @@ void see_all_round(Vehicle& vehicle) {
   camera.width = wide.width;
   camera.height = wide.height;
   camera.tan_half_width = camera.tan_half_height = wide.tan_half_width;
-  camera.range_min_m = wide.range_min_m;  // the one below stands on the ground
   vehicle.rig.cameras.clear();
   vehicle.rig.lidars.clear();
   vehicle.patterns.clear();

@@ -67,6 +67,24 @@ TEST_F(RigFlight, OneFrontCameraReachesTheGoal) {
   EXPECT_LT(most_turn_radps, 1.6) << "not faster than it is told";
 }
 
+TEST_F(RigFlight, ACameraBelowThatSeesNothingOnTheGroundDoesNotHoldTheTakeOff) {
+  SensorRig& rig = config_.simulator.rig.emplace();
+  for (const double yaw_deg : {0.0, 90.0, 180.0, 270.0}) {
+    CameraSpec camera;
+    camera.mount = {.yaw_deg = yaw_deg};
+    ASSERT_TRUE(rig.cameras.push_back(camera));
+  }
+  for (const double pitch_deg : {-90.0, 90.0}) {
+    CameraSpec camera;
+    camera.range_min_m = 0.3;
+    camera.mount = {.pitch_deg = pitch_deg};
+    ASSERT_TRUE(rig.cameras.push_back(camera));
+  }
+  const report::MissionResult r = fly("six cameras that see nothing nearer than 0.3 m");
+  EXPECT_FALSE(r.collided);
+  EXPECT_TRUE(r.reached_goal) << r.reason;
+}
+
 TEST_F(RigFlight, ARigThatCannotBeIsRefusedByName) {
   const auto refusal = [&](auto&& change) -> std::string {
     config_.simulator.rig.emplace();
