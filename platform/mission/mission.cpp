@@ -53,16 +53,17 @@ report::KnownSlice known_slice(const stages::MapView& view, const Aabb& bounds_W
     for (int k = 0; k < kBlockCells * kBlockCells; ++k) {
       const int x = k % kBlockCells;
       const int y = k / kBlockCells;
+      const int layer_row = kBlockCells * z + y;
       const auto of = [&](const stages::CellRows& rows) {
-        return (rows[static_cast<std::size_t>(kBlockCells * z + y)] >> x & 1U) != 0;
+        return (rows[static_cast<std::size_t>(layer_row)] >> x & 1) != 0;
       };
       Cell cell = content == stages::BlockContent::kFree ? Cell::kFree : Cell::kUnknown;
       if (content == stages::BlockContent::kMixed) {
         if (of(cells.free)) cell = Cell::kFree;
         if (of(cells.occupied)) cell = Cell::kOccupied;
       }
-      slice.cell[static_cast<std::size_t>((row * kBlockCells + y) * slice.columns + column * kBlockCells +
-                                          x)] = cell;
+      const int at = (row * kBlockCells + y) * slice.columns + column * kBlockCells + x;
+      slice.cell[static_cast<std::size_t>(at)] = cell;
     }
   }
   return slice;

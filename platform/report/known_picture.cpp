@@ -10,10 +10,10 @@
 namespace roborun::report {
 namespace {
 
-constexpr double kWidth = 830.0;
-constexpr double kLeft = 50.0;
-constexpr double kRight = 20.0;
-constexpr double kMaxPanel = 700.0;
+constexpr double kPictureWidth = 830.0;
+constexpr double kPictureLeft = 50.0;
+constexpr double kPictureRight = 20.0;
+constexpr double kPictureMaxPanel = 700.0;
 constexpr const char* kUnseen = "#d3d6da";
 constexpr const char* kFree = "#e8f3ff";
 constexpr const char* kSeen = "#d55e00";  // Okabe and Ito
@@ -55,16 +55,17 @@ std::string known_svg(const Scene& scene, std::span<const MissionReport> mission
   plain.zone_borders_m.clear();
   plain.background = kUnseen;
   const Vector3 size = scene.bounds_W.size();
-  const double scale = std::min((kWidth - kLeft - kRight) / size.x(), kMaxPanel / size.y());
+  const double scale =
+      std::min((kPictureWidth - kPictureLeft - kPictureRight) / size.x(), kPictureMaxPanel / size.y());
   const double panel = size.y() * scale;
-  svg.text(kLeft, 26, scene.title, "start", 15, kInk, "bold");
+  svg.text(kPictureLeft, 26, scene.title, "start", 15, kInk, "bold");
   const Quantity coloured = quantity(PathColour::kSpeed, missions);
-  draw_legend(svg, coloured, kWidth - kRight, 40);
+  draw_legend(svg, coloured, kPictureWidth - kPictureRight, 40);
   constexpr std::array<Key, 4> kKeys{{{kFree, "known to be free", 140},
                                       {kSeen, "known to be occupied", 170},
                                       {kUnseen, "not known", 95},
                                       {"#3e4c59", "obstacle (the truth)", 0}}};
-  double x = kLeft;
+  double x = kPictureLeft;
   for (const Key& key : kKeys) {
     svg.add(R"(<rect x="{:.1f}" y="80" width="13" height="13" fill="{}" stroke="{}" stroke-width="0.5"/>)", x,
             key.fill, kSoft);
@@ -74,18 +75,18 @@ std::string known_svg(const Scene& scene, std::span<const MissionReport> mission
   double y = 120;
   for (const MissionReport& mission : missions) {
     const MissionResult& r = mission.result;
-    svg.text(kLeft, y,
+    svg.text(kPictureLeft, y,
              fmt::format("{}: {} in {:.0f} s, {:.0f} m flown, mean {:.2f} m/s; the map is cut {:g} m high",
                          r.design, outcome(r), r.mission_time_s, r.distance_m, r.mean_velocity_mps,
                          mission.known.height_m),
              "start", 13);
-    const Frame f{scene.bounds_W.min_W.x(), scene.bounds_W.max_W.y(), scale, kLeft, y + 10};
+    const Frame f{scene.bounds_W.min_W.x(), scene.bounds_W.max_W.y(), scale, kPictureLeft, y + 10};
     draw_world(svg, plain, f, panel, [&] { draw_known(svg, mission.known, scene.bounds_W, f); });
     draw_path(svg, mission, f, coloured);
     draw_ends(svg, scene, f);
     y += panel + 56;
   }
-  return svg.finish(kWidth, y - 20, scene.title,
+  return svg.finish(kPictureWidth, y - 20, scene.title,
                     "Worlds from above: the way flown, coloured by speed, over what the vehicle's map knew "
                     "to be free, knew to be "
                     "occupied, and did not know when the flight ended.");

@@ -64,7 +64,9 @@ std::vector<SuiteSummary> summarise(const std::vector<MissionResult>& flights) {
   std::vector<SuiteSummary> summaries;
   std::vector<std::vector<double>> ratios;
   for (const MissionResult& r : flights) {
-    const auto [world, vehicle] = parts(r);
+    const auto names = parts(r);
+    const auto& world = names.first;
+    const auto& vehicle = names.second;
     auto found = std::find_if(summaries.begin(), summaries.end(), [&](const SuiteSummary& s) {
       return s.world == world && s.vehicle == vehicle && s.profile == r.profile && s.design == r.design;
     });
@@ -119,7 +121,9 @@ std::string suite_table(const std::vector<MissionResult>& flights) {
       "of them\n";
   for (const MissionResult& r : flights) {
     if (!failed(r)) continue;
-    const auto [world, vehicle] = parts(r);
+    const auto names = parts(r);
+    const auto& world = names.first;
+    const auto& vehicle = names.second;
     text += fmt::format("{}: {}, {}, {}, {}, seed {}: {} after {:.0f} s, {:.0f} m\n  {}\n",
                         possible(r) ? "failed" : "impossible, and not proven", world, vehicle, r.profile,
                         r.design, r.seed, r.reason, r.mission_time_s, r.distance_m, r.suite->command);
@@ -148,7 +152,9 @@ std::string suite_json(const std::string& suite, const std::vector<MissionResult
   json["failed"] = Json::array();
   for (const MissionResult& r : flights) {
     if (!failed(r)) continue;
-    const auto [world, vehicle] = parts(r);
+    const auto names = parts(r);
+    const auto& world = names.first;
+    const auto& vehicle = names.second;
     json["failed"].push_back({{"world", world},
                               {"vehicle", vehicle},
                               {"profile", r.profile},

@@ -50,7 +50,8 @@ void see_all_round(Vehicle& vehicle) {
   camera.height = wide.height;
   camera.tan_half_width = camera.tan_half_height = wide.tan_half_width;
   vehicle.rig.cameras.clear();
-  camera.range_min_m = wide.range_min_m;  // from the ground, what is nearer than that to all six stays unknown
+  camera.range_min_m =
+      wide.range_min_m;  // from the ground, what is nearer than that to all six stays unknown
   vehicle.rig.lidars.clear();
   vehicle.patterns.clear();
   constexpr double kRight_deg = 90.0;

@@ -15,7 +15,6 @@ constexpr std::size_t kHeap = 1U << 17U;
 constexpr std::int32_t kWindow = 13, kWindowHeight = 9;  // blocks of one look, and one more for the widths
 constexpr std::size_t kWindowBlocks =
     static_cast<std::size_t>(kWindow + 1) * (kWindow + 1) * (kWindowHeight + 1);
-constexpr double kMost_m = 1e5;
 constexpr double kStands_m = 0.3;  // from one look to the next
 constexpr std::uint32_t kMostWaits = 128;
 constexpr std::uint64_t kWorkOfABlock = 64;  // lookups that a block that changed counts as

@@ -82,6 +82,7 @@ class WayMemory {
     std::uint64_t digest{};
   };
   static constexpr std::uint32_t kFar = 0xFFFFFFFFU;
+  static constexpr double kMost_m = 1e5;  ///< Of any coordinate.
   static constexpr std::uint32_t kNowhere = 0xFFFFFFFFU;
   struct Node {
     std::uint32_t cost{kFar};

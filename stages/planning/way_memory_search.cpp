@@ -8,9 +8,8 @@
 namespace roborun::stages {
 namespace {
 
-constexpr double kUnit_m = 0.01;  // of costs
-constexpr double kMost_m = 1e5;
-constexpr std::uint32_t kPollEvery = 256;
+constexpr double kCost_m = 0.01;  // of costs
+constexpr std::uint32_t kNodesPerPoll = 256;
 constexpr double kWaits = 16.0;          // after so many what is unknown costs twice as much
 constexpr std::uint32_t kBeyond = 3000;  // units of cost that the search runs on beyond the vehicle
 constexpr std::array<std::array<std::int32_t, 3>, 6> kStep{
@@ -24,7 +23,7 @@ double WayMemory::price(std::uint32_t position, unsigned room) const noexcept {
 
 std::uint32_t WayMemory::step_cost(const Cell& from, const Cell& to, double price) noexcept {
   const double length_m = kFinestCell_m * Vector3(from.x - to.x, from.y - to.y, from.z - to.z).norm();
-  return static_cast<std::uint32_t>(std::lround(length_m / kUnit_m * price));
+  return static_cast<std::uint32_t>(std::lround(length_m / kCost_m * price));
 }
 
 void WayMemory::reach(std::uint32_t node, std::uint32_t cost, std::uint32_t next,
@@ -126,7 +125,7 @@ bool WayMemory::seed_border(const Vector3& goal_W) noexcept {
         if ((!row && !at_border(x, low_.x, high_.x, size_.x)) || kind_at(position) != kOpen) continue;
         const Cell middle{kBlockCells * x + 8, kBlockCells * y + 8, kBlockCells * z + 8};
         const double rest_m = kUnknownWeight * (goal_W - at_W(middle)).norm();
-        reach(position, static_cast<std::uint32_t>(std::fmin(rest_m / kUnit_m, 4e8)), kNowhere, middle);
+        reach(position, static_cast<std::uint32_t>(std::fmin(rest_m / kCost_m, 4e8)), kNowhere, middle);
         any = true;
       }
     }
@@ -152,7 +151,7 @@ Status WayMemory::solve(const Vector3& from_W, const Vector3& goal_W, core::Stag
   if (!seed(goal_W)) return Status::kGoalBlocked;
   std::uint32_t until = kFar;
   for (std::uint32_t i = 1; !reached_.empty(); ++i) {
-    if (i % kPollEvery == 0 && budget.spent(work)) return Status::kBudgetSpent;
+    if (i % kNodesPerPoll == 0 && budget.spent(work)) return Status::kBudgetSpent;
     const std::uint64_t entry = reached_.pop();
     const auto node = static_cast<std::uint32_t>(entry);
     if (entry >> 32U > until) break;
@@ -174,7 +173,7 @@ double WayMemory::to_goal_m(const Vector3& p_W) const noexcept {
   const std::uint32_t position = position_of({place.x >> 4, place.y >> 4, place.z >> 4});
   const Node& n = node_[node_of(position, room)];
   if (n.settled != search_) return kInfinity;
-  return kUnit_m * n.cost + (at_W(n.entry) - p_W).norm() * price(position, room);
+  return kCost_m * n.cost + (at_W(n.entry) - p_W).norm() * price(position, room);
 }
 
 std::size_t WayMemory::known_way(const Vector3& from_W, double within_m,

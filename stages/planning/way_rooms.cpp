@@ -92,7 +92,7 @@ void number(CellRows rows, unsigned first, unsigned last, WayRooms& rooms) noexc
       if (room[i] == 0) continue;
       rows[i] = static_cast<std::uint16_t>(rows[i] & ~room[i]);
       for (unsigned x = 0; x < kBlockCells; ++x)
-        rooms.number[i] |= (((room[i] >> x) & 1U) != 0 ? std::uint64_t{next} : 0U) << (4U * x);
+        rooms.number[i] |= (((std::uint32_t{room[i]} >> x) & 1U) != 0 ? std::uint64_t{next} : 0U) << (4U * x);
     }
   }
 }
