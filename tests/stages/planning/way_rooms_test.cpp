@@ -10,6 +10,8 @@
 namespace roborun::stages {
 namespace {
 
+bool bit(const CellRows& rows, std::size_t row, std::size_t x) { return ((rows[row] >> x) & 1) != 0; }
+
 /// Eight blocks of cells: some blocks all free or all unknown, the others at random.
 struct Scene {
   explicit Scene(std::uint64_t seed) {
@@ -36,8 +38,8 @@ struct Scene {
     if (cells.content[i] == BlockContent::kFree) return CellState::kFree;
     if (cells.content[i] == BlockContent::kUnknown) return CellState::kUnknown;
     const std::size_t row = 16 * (z % 16) + y % 16;
-    if (((block[i].occupied[row] >> (x % 16)) & 1U) != 0) return CellState::kOccupied;
-    return ((block[i].free[row] >> (x % 16)) & 1U) != 0 ? CellState::kFree : CellState::kUnknown;
+    if (bit(block[i].occupied, row, x % 16)) return CellState::kOccupied;
+    return bit(block[i].free, row, x % 16) ? CellState::kFree : CellState::kUnknown;
   }
   std::array<CellBlock, 8> block{};
   WayCells cells;
@@ -58,8 +60,8 @@ TEST(WayRooms, PlacesAreThoseOfABoxOfCells) {
         occupied = occupied || state == CellState::kOccupied;
       }
       const std::size_t row = 16 * z + y;
-      ASSERT_EQ((places.known[row] >> x) & 1U, free ? 1U : 0U) << seed << " " << i;
-      ASSERT_EQ((places.open[row] >> x) & 1U, !free && !occupied ? 1U : 0U) << seed << " " << i;
+      ASSERT_EQ(bit(places.known, row, x), free) << seed << " " << i;
+      ASSERT_EQ(bit(places.open, row, x), !free && !occupied) << seed << " " << i;
     }
   }
 }
