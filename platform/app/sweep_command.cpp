@@ -182,6 +182,13 @@ evaluation::SweepPlan plan_of(const SweepOptions& options, evaluation::SweepInpu
   return plan;
 }
 
+/// What is below the table: how many are missing, and where the report is.
+void tell_rest(const evaluation::SweepStore& store, std::size_t done, const char* what, bool report) {
+  const std::size_t all = store.missions().size();
+  if (!store.complete()) fmt::print("{} of {} {} are missing\n", all - done, all, what);
+  if (report) fmt::print("report: {}/report.html\n", store.folder());
+}
+
 /// With commands that name the folder of the worlds.
 void tell_suite(const evaluation::SweepStore& store, const SweepOptions& options) {
   const evaluation::SweepPlan& plan = store.plan();
@@ -198,10 +205,7 @@ void tell_suite(const evaluation::SweepStore& store, const SweepOptions& options
     return;
   }
   fmt::print("{}", report::suite_table(flights));
-  if (!store.complete())
-    fmt::print("{} of {} flights are missing\n", store.missions().size() - flights.size(),
-               store.missions().size());
-  if (report) fmt::print("report: {}/report.html\n", store.folder());
+  tell_rest(store, flights.size(), "flights", report);
 }
 
 void tell(const evaluation::SweepStore& store, const SweepOptions& options) {
@@ -219,10 +223,7 @@ void tell(const evaluation::SweepStore& store, const SweepOptions& options) {
     return;
   }
   fmt::print("{}", report::sweep_table(rows));
-  if (!store.complete())
-    fmt::print("{} of {} missions are missing\n", store.missions().size() - rows.size(),
-               store.missions().size());
-  if (report) fmt::print("report: {}/report.html\n", store.folder());
+  tell_rest(store, rows.size(), "missions", report);
 }
 
 int sweep(const SweepOptions& options) {

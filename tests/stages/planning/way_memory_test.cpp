@@ -40,6 +40,15 @@ class WayMemoryTest : public ::testing::Test {
     const std::size_t count = sut_->known_way(from_W, within_m, way_W);
     return count == 0 ? from_W : way_W[count - 1];
   }
+  /// How far to the left the known way leads.
+  [[nodiscard]] double farthest_side_m() {
+    std::array<Vector3, 64> way_W;
+    const std::size_t count = sut_->known_way(start_W_, 100.0, way_W);
+    EXPECT_GT(count, 0U);
+    double side_m = 0.0;
+    for (std::size_t i = 0; i < count; ++i) side_m = std::fmax(side_m, way_W[i].y());
+    return side_m;
+  }
   void box(double x0, double y0, double x1, double y1) {
     view_.occupied.push_back({Vector3(x0, y0, 0), Vector3(x1, y1, 20)});
   }
@@ -66,13 +75,8 @@ TEST_F(WayMemoryTest, LeadsAroundAWallThatIsKnown) {
   box(10, -20, 10.6, 12);  // open at y > 12, within what is known
   make();
   ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
-  std::array<Vector3, 64> way_W;
-  const std::size_t count = sut_->known_way(start_W_, 100.0, way_W);
-  ASSERT_GT(count, 0U);
-  double side_m = 0.0;
-  for (std::size_t i = 0; i < count; ++i) side_m = std::fmax(side_m, way_W[i].y());
-  EXPECT_GT(side_m, 12.0);
-  EXPECT_GT(way_W[count - 1].x(), 10.0) << "past it";
+  EXPECT_GT(farthest_side_m(), 12.0);
+  EXPECT_GT(last_known(start_W_).x(), 10.0) << "past it";
 }
 
 TEST_F(WayMemoryTest, LeavesADeadEnd) {
@@ -108,11 +112,7 @@ TEST_F(WayMemoryTest, AFenceIsAWall) {
   ASSERT_EQ(config_.fence.add_polygon(core::FenceSide::kKeepOut, wall), core::FenceFault::kNone);
   make();
   ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
-  std::array<Vector3, 64> way_W;
-  const std::size_t count = sut_->known_way(start_W_, 100.0, way_W);
-  double side_m = 0.0;
-  for (std::size_t i = 0; i < count; ++i) side_m = std::fmax(side_m, way_W[i].y());
-  EXPECT_GT(side_m, 12.0);
+  EXPECT_GT(farthest_side_m(), 12.0);
 }
 
 TEST_F(WayMemoryTest, RemembersWhatTheMapGaveUp) {
