@@ -8,7 +8,6 @@
 namespace roborun::flight {
 namespace {
 
-constexpr double kReach_m = 15.0;  // farther away depth noise looks like motion
 constexpr int kLeastPoints = 3;
 constexpr double kStanding_mps = 0.5;
 constexpr double kSpacing_m = 0.6;  // of two traces
