@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "core/precision.hpp"
 #include "core/sensor_model.hpp"
 #include "platform/app/exit_code.hpp"
 #include "platform/app/options.hpp"
@@ -159,8 +158,7 @@ void add_map_build_command(CLI::App& map, std::function<int()>& run) {
       "  roborun map build --from street --range 60 --json\n\n"
       "Exit code: 0 done, 2 bad input, 130 interrupted.");
   command->add_option("--from", options->from, "a folder")->required();
-  add_number(*command, "--precision", options->precision_m, kFinestCell_m, kFinestCell_m,
-             "edge of the finest cells, metres");
+  add_number(*command, "--precision", options->precision_m, 0.05, 0.3, "edge of the finest cells, metres");
   add_number(*command, "--range", options->range_m, 0.5, 300.0, "what is farther is not looked at, metres");
   command->add_option("--intrinsics", options->intrinsics, "FX,FY,CX,CY in pixels, instead of camera.txt");
   command->add_option("--depth-scale", options->scale, "values of an image per metre, such as 1000 or 5000");

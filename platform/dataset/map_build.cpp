@@ -24,6 +24,7 @@ stages::BrickMap::Config config_for(Recording& recording, double precision_m) {
   const auto first = recording.load(0);  // now the size of the images is known
   stages::BrickMap::Config config;
   config.bounds_W = recording.reach_W();
+  config.lattice.finest_m = precision_m;
   const Vector3 size = config.bounds_W.size();
   const double brick_m = precision_m * stages::kBlockCells;
   const Vector3 bricks = (size / brick_m).array() + 4.0;

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "core/precision.hpp"
-
 namespace roborun::dataset {
 namespace {
 
@@ -121,7 +119,7 @@ double Agreement::false_occupied_ratio() const noexcept { return ratio(occupied_
 
 void judge(const stages::MapView& view, std::span<const stages::PosedDepthFrame> frames,
            Agreement& agreement) {
-  const double cell_m = kFinestCell_m, block_m = stages::kBlockCells * cell_m;
+  const double cell_m = view.finest_m(), block_m = stages::block_m(cell_m);
   std::uint64_t lookups = 0;
   for (const stages::PosedDepthFrame& posed : frames) {
     const Image image(posed);

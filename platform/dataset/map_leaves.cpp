@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "core/precision.hpp"
 #include "platform/input/input_error.hpp"
 
 namespace roborun::dataset {
@@ -31,7 +30,7 @@ void add_cells(const stages::CellBlock& cells, std::uint64_t first, std::vector<
 }  // namespace
 
 sitl::OctomapLeaves leaves_of(const stages::MapView& view, const Aabb& box_W) {
-  const double cell_m = kFinestCell_m, block_m = kCells * cell_m;
+  const double cell_m = view.finest_m(), block_m = stages::block_m(cell_m);
   std::array<std::int32_t, 3> low{}, high{};
   for (std::size_t i = 0; i < 3; ++i) {
     const auto axis = static_cast<Eigen::Index>(i);

@@ -27,8 +27,8 @@ Vector3 assumed_free_half_m(const VehicleModel& vehicle, bool sees_all_around,
   if (sees_all_around) return Vector3::Zero();
   // What has to be free around the start of a plan, and as far as the sensors see less of it than that while the
   // vehicle turns: at a distance of d they see d * ratio up and down.
-  const double half_m = planned_radius_m(vehicle) + kCornerRoom_m + kFinestCell_m;
-  const double reach_m = std::min((half_m + kFinestCell_m) / level_view_ratio + kFinestCell_m, kMost_m);
+  const double half_m = planned_radius_m(vehicle) + kCornerRoom_m + kPublishedCell_m;
+  const double reach_m = std::min((half_m + kPublishedCell_m) / level_view_ratio + kPublishedCell_m, kMost_m);
   return {std::max(reach_m, half_m), std::max(reach_m, half_m), half_m};
 }
 
@@ -74,7 +74,7 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   const stages::SpaceProfilerConfig profiler{.vehicle_width_m = 2.0 * config_.vehicle.radius_m};
   stages::CloudNeed need = stages::needed_points(profiler, in.p_WB, relevant_W);
   need.reach_m = std::fmax(need.reach_m, MotionWatch::kReach_m);
-  (void)cloud_.step(in.frames, 0, need, budget, work);
+  (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), need, budget, work);
   motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W}, cloud_.points(), map_.view(), budget, work);
   out.motion = motion_.moving(in.now);
   (void)profile_space(profiler, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB,
