@@ -132,7 +132,7 @@ void judge(const stages::MapView& view, std::span<const stages::PosedDepthFrame>
       for (double y = low.y(); y <= high.y(); y += 1.0)
         for (double x = low.x(); x <= high.x(); x += 1.0) {
           const Vector3 corner_W = block_m * Vector3(x, y, z);
-          if (view.read(corner_W, cells, lookups) == stages::BlockContent::kMixed)
+          if (view.read(corner_W, cell_m, cells, lookups) == stages::BlockContent::kMixed)
             judge_block(cells, corner_W, cell_m, image, agreement);
         }
   }

@@ -53,7 +53,7 @@ sitl::OctomapLeaves leaves_of(const stages::MapView& view, const Aabb& box_W) {
   stages::CellBlock cells;
   std::uint64_t lookups = 0;
   for (const auto& [morton, at] : blocks) {
-    switch (view.read(block_m * Vector3(at[0], at[1], at[2]), cells, lookups)) {
+    switch (view.read(block_m * Vector3(at[0], at[1], at[2]), cell_m, cells, lookups)) {
       case stages::BlockContent::kUnknown:
         break;
       case stages::BlockContent::kFree:

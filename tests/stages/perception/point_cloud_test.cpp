@@ -18,7 +18,9 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct Fixture {
-  Fixture() : block(2 * PointCloud::arena_bytes({})), arena(block), all({}, arena), some({}, arena) {}
+  static constexpr PointCloud::Config kLarge{.max_points = 262144};
+  Fixture()
+      : block(2 * PointCloud::arena_bytes(kLarge)), arena(block), all(kLarge, arena), some(kLarge, arena) {}
   /// Both clouds of the same images: with all points, and with those that are needed.
   void look(const test::Scene& at_scene, const Vector3& p_W, const CloudNeed& need, int pixels) {
     test::Scene scene = at_scene;
