@@ -100,12 +100,14 @@ Vector3 WayMemory::at_W(const Cell& place) const noexcept {
 
 unsigned WayMemory::room_at(const Cell& place) const noexcept {
   const Cell block{place.x >> 4, place.y >> 4, place.z >> 4};
-  if (!has(block)) return 0;
-  const std::int32_t kind = kind_at(position_of(block));
+  return has(block) ? room_at(kind_at(position_of(block)), {place.x & 15, place.y & 15, place.z & 15}) : 0;
+}
+
+unsigned WayMemory::room_at(std::int32_t kind, const Cell& inside) const noexcept {
   if (kind == kOpen) return kFirstOpenRoom;
   if (kind == kKnown) return 1;
   if (kind == kClosed) return 0;
-  return block_[static_cast<std::size_t>(kind)].rooms.at(place.x & 15, place.y & 15, place.z & 15);
+  return block_[static_cast<std::size_t>(kind)].rooms.at(inside.x, inside.y, inside.z);
 }
 
 bool WayMemory::nearest_room(const Vector3& p_W, Cell& place) const noexcept {
@@ -253,15 +255,25 @@ void WayMemory::forbid(const Cell& block, WayPlaces& places) const noexcept {
   if (bounds_W.contains(low_W) && bounds_W.contains(high_W) &&
       (config_.fence.empty() || config_.fence.allows(Aabb{low_W - r, high_W + r})))
     return;
+  const auto within = [&bounds_W](const Vector3& p_W, int axis) {
+    return p_W[axis] >= bounds_W.min_W[axis] && p_W[axis] <= bounds_W.max_W[axis];
+  };
+  unsigned inside = 0;  // of a row
+  for (std::int32_t x = 0; x < kBlockCells; ++x)
+    inside |= within(at_W({first.x + x, first.y, first.z}), 0) ? 1U << static_cast<unsigned>(x) : 0U;
   for (std::int32_t i = 0; i < 256; ++i) {
-    for (std::int32_t x = 0; x < kBlockCells; ++x) {
-      const Vector3 p_W = at_W({first.x + x, first.y + i % kBlockCells, first.z + i / kBlockCells});
-      if (bounds_W.contains(p_W) && (config_.fence.empty() || config_.fence.allows(Aabb{p_W - r, p_W + r})))
-        continue;
-      const auto keep = static_cast<std::uint16_t>(~(1U << static_cast<unsigned>(x)));
-      places.known[static_cast<std::size_t>(i)] &= keep;
-      places.open[static_cast<std::size_t>(i)] &= keep;
+    const Cell row{first.x, first.y + i % kBlockCells, first.z + i / kBlockCells};
+    const Vector3 row_W = at_W(row);
+    std::uint16_t &known = places.known[static_cast<std::size_t>(i)],
+                  &open = places.open[static_cast<std::size_t>(i)];
+    unsigned keep = within(row_W, 1) && within(row_W, 2) ? inside & static_cast<unsigned>(known | open) : 0U;
+    for (unsigned bits = config_.fence.empty() ? 0U : keep; bits != 0; bits &= bits - 1) {
+      const std::int32_t x = __builtin_ctz(bits);
+      const Vector3 p_W = at_W({row.x + x, row.y, row.z});
+      if (!config_.fence.allows(Aabb{p_W - r, p_W + r})) keep &= ~(1U << static_cast<unsigned>(x));
     }
+    known = static_cast<std::uint16_t>(known & keep);
+    open = static_cast<std::uint16_t>(open & keep);
   }
 }
 
@@ -312,13 +324,15 @@ void WayMemory::find_face_doors(Block& b, const Cell& block, std::size_t face) n
   const auto cell = [face, side](int u, int v) {
     return face / 2 == 0 ? Cell{side, u, v} : face / 2 == 1 ? Cell{u, side, v} : Cell{u, v, side};
   };
+  const Cell step{face / 2 == 0 ? by : 0, face / 2 == 1 ? by : 0, face / 2 == 2 ? by : 0};
+  const Cell next{block.x + step.x, block.y + step.y, block.z + step.z};
+  const std::int32_t kind = has(next) ? kind_at(position_of(next)) : kClosed;
+  if (kind == kClosed) return;
   const auto rooms_at = [&](int u, int v) {
     const Cell c = cell(u, v);
     const unsigned room = b.rooms.at(c.x, c.y, c.z);
-    const Cell next{kBlockCells * block.x + c.x + (face / 2 == 0 ? by : 0),
-                    kBlockCells * block.y + c.y + (face / 2 == 1 ? by : 0),
-                    kBlockCells * block.z + c.z + (face / 2 == 2 ? by : 0)};
-    const unsigned other = room == 0 ? 0 : room_at(next);
+    const Cell in_next{(c.x + step.x) & 15, (c.y + step.y) & 15, (c.z + step.z) & 15};
+    const unsigned other = room == 0 ? 0 : room_at(kind, in_next);
     return other == 0 ? 0U : kRooms * room + other;
   };
   std::array<std::uint8_t, 256> at{};

@@ -108,6 +108,8 @@ class WayMemory {
   [[nodiscard]] Cell place_of(const Vector3& p_W) const noexcept;
   [[nodiscard]] Vector3 at_W(const Cell& place) const noexcept;
   [[nodiscard]] unsigned room_at(const Cell& place) const noexcept;
+  /// The same in a block of this kind, of the place `inside` it.
+  [[nodiscard]] unsigned room_at(std::int32_t kind, const Cell& inside) const noexcept;
   /// The nearest place that is not closed (known, if there is one), at most two cells away.
   [[nodiscard]] bool nearest_room(const Vector3& p_W, Cell& place) const noexcept;
   [[nodiscard]] std::uint32_t node_of(std::uint32_t position, unsigned room) const noexcept;
