@@ -1,6 +1,7 @@
 #include "stages/planning/way_memory.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "core/random/counter_rng.hpp"
@@ -367,13 +368,25 @@ void WayMemory::find_inner_doors(Block& b) noexcept {
     int count, x, y, z;
   };
   std::array<Pair, std::size_t{kFirstOpenRoom} * kFirstOpenRoom> pair{};
-  const auto for_each = [&b](const auto& what) {
+  // The highest bit of each place's four: whether its room is open. So a row is one operation.
+  static_assert(kFirstOpenRoom == 8 && kRooms == 16);
+  constexpr std::uint64_t kHigh = 0x8888'8888'8888'8888ULL;
+  const auto open_places = [&b](std::int32_t y, std::int32_t z) {
+    return ((y | z) & ~15) != 0 ? 0 : b.rooms.number[static_cast<std::size_t>(16 * z + y)] & kHigh;
+  };
+  const auto known_places = [&b](std::int32_t y, std::int32_t z) {
+    const std::uint64_t n = b.rooms.number[static_cast<std::size_t>(16 * z + y)];
+    return (n << 1U | n << 2U | n << 3U) & ~n & kHigh;
+  };
+  const auto for_each = [&](const auto& what) {
     for (std::int32_t i = 0; i < 256; ++i) {
-      if (b.rooms.number[static_cast<std::size_t>(i)] == 0) continue;
       const std::int32_t y = i % 16, z = i / 16;
-      for (std::int32_t x = 0; x < 16; ++x) {
+      const std::uint64_t open = open_places(y, z);
+      const std::uint64_t beside_open = open << 4U | open >> 4U | open_places(y - 1, z) |
+                                        open_places(y + 1, z) | open_places(y, z - 1) | open_places(y, z + 1);
+      for (std::uint64_t bits = known_places(y, z) & beside_open; bits != 0; bits &= bits - 1) {
+        const std::int32_t x = std::countr_zero(bits) / 4;
         const unsigned room = b.rooms.at(x, y, z);
-        if (!is_known_room(room)) continue;
         const auto beside = [&](std::int32_t nx, std::int32_t ny, std::int32_t nz) {
           if (((nx | ny | nz) & ~15) != 0) return;
           const unsigned other = b.rooms.at(nx, ny, nz);
@@ -388,12 +401,15 @@ void WayMemory::find_inner_doors(Block& b) noexcept {
     Pair& p = pair[rooms];
     ++p.count, p.x += x, p.y += y, p.z += z;
   });
+  for (Pair& p : pair) {
+    if (p.count > 0) p.x /= p.count, p.y /= p.count, p.z /= p.count;  // their middle from now on
+  }
   std::array<int, pair.size()> best{};
   std::array<Door, pair.size()> door{};
   best.fill(1 << 30);
   for_each([&](unsigned rooms, int x, int y, int z) {
     const Pair& p = pair[rooms];
-    const int dx = x - p.x / p.count, dy = y - p.y / p.count, dz = z - p.z / p.count;
+    const int dx = x - p.x, dy = y - p.y, dz = z - p.z;
     const int away = dx * dx + dy * dy + dz * dz;
     if (away >= best[rooms]) return;
     best[rooms] = away;
