@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "core/geometry/math.hpp"
 #include "platform/dataset/pose_text.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
@@ -98,6 +99,23 @@ Agreement shifted(const std::string& name, std::size_t from, double by_m) {
   return build_map(recording, kCell_m, false, always).agreement;
 }
 
+TEST(MapBuild, CellsAreAsFineAsAsked) {
+  const std::string folder = recording_of("fine", 10);
+  double occupied_m3 = 1e9;
+  for (const double cell_m : {0.3, 0.15, 0.05}) {
+    Recording recording(folder, options());
+    const MapBuild build = build_map(recording, cell_m, true, always);
+    EXPECT_EQ(build.leaves.resolution_m, cell_m);
+    EXPECT_LT(build.agreement.false_free_ratio(), 0.001);
+    double here_m3 = 0.0;
+    for (const sitl::OctomapLeaf& leaf : build.leaves.leaves)
+      here_m3 += leaf.occupied ? std::pow(cell_m * leaf.size, 3) : 0.0;
+    EXPECT_LT(here_m3, occupied_m3) << "surfaces are thinner";
+    EXPECT_GT(here_m3, 0.0);
+    occupied_m3 = here_m3;
+  }
+}
+
 TEST(MapBuild, WrongPosesAreSeenInTheFigures) {
   const Agreement right = shifted("right", 20, 0.0);
   const Agreement back = shifted("back", 20, -1.0);   // surfaces come to stand where free space was seen
@@ -106,6 +124,46 @@ TEST(MapBuild, WrongPosesAreSeenInTheFigures) {
   EXPECT_GT(back.missed_ratio(), right.missed_ratio() + 0.005);
   EXPECT_GT(ahead.false_occupied_ratio(), right.false_occupied_ratio() + 0.005);
   EXPECT_GT(ahead.missed_ratio(), right.missed_ratio() + 0.005);
+}
+
+TEST(MapBuild, CloudsBecomeAMap) {
+  const std::string folder = test::scratch("sweeps");
+  std::filesystem::create_directories(folder);
+  const sitl::World room = test::room();
+  std::ofstream poses(folder + "/poses.txt");
+  constexpr int kSweeps = 8, kRings = 121, kColumns = 360;
+  for (int i = 0; i < kSweeps; ++i) {
+    const Vector3 p_WL(-2.0 + 0.3 * i, 1.0, 1.5);
+    poses << fmt::format("{} {} {} {} 0 0 0 1\n", i, p_WL.x(), p_WL.y(), p_WL.z());
+    std::string points;
+    for (int ring = 0; ring < kRings; ++ring)
+      for (int column = 0; column < kColumns; ++column) {
+        const double up = (ring - 60) * core::kDegree, round = column * core::kDegree;
+        const Vector3 ray(std::cos(up) * std::cos(round), std::cos(up) * std::sin(round), std::sin(up));
+        const Vector3 p_L = room.hit_distance_m(p_WL, ray, 30.0) * ray;
+        points += fmt::format("{:.3f} {:.3f} {:.3f}\n", p_L.x(), p_L.y(), p_L.z());
+      }
+    std::ofstream(folder + fmt::format("/{}.pcd", i))
+        << fmt::format("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nPOINTS {}\nDATA ascii\n{}",
+                       kRings * kColumns, points);
+  }
+  poses.close();
+  Recording recording(folder, options());
+  const MapBuild build = build_map(recording, kCell_m, true, always);
+  EXPECT_EQ(build.frames, std::size_t{kSweeps});
+  EXPECT_GT(build.agreement.surface_pixels, 10'000U);
+  EXPECT_LT(build.agreement.false_free_ratio(), 0.01);
+  EXPECT_LT(build.agreement.false_occupied_ratio(), 0.01);
+  std::size_t free = 0, wrong = 0;
+  for (const sitl::OctomapLeaf& leaf : build.leaves.leaves) {
+    const auto cell = sitl::octomap_cell(leaf.morton);
+    const Vector3 middle_W =
+        kCell_m * (Vector3(cell[0], cell[1], cell[2]) + Vector3::Constant(0.5 * leaf.size - 32768.0));
+    free += leaf.occupied ? 0U : 1U;
+    wrong += !leaf.occupied && (room.clearance_m(middle_W, 1.0) <= 0.0 || middle_W.z() < 0.0) ? 1U : 0U;
+  }
+  EXPECT_GT(free, 100U);
+  EXPECT_EQ(wrong, 0U);
 }
 
 TEST(MapBuild, OneImageAgreesWithNone) {
