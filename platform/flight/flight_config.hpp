@@ -9,6 +9,7 @@
 #include "core/executive/frame_table.hpp"
 #include "core/geometry/fence.hpp"
 #include "core/geometry/vector.hpp"
+#include "core/precision.hpp"
 #include "core/sensor_rig.hpp"
 #include "core/vehicle_model.hpp"
 #include "firmware_if/status.hpp"
@@ -50,6 +51,8 @@ struct FlightConfig {
   [[nodiscard]] Status validate() const noexcept;
 };
 
+/// The vehicle's own of the design aware; the static ones fly at the published precision.
+[[nodiscard]] PrecisionLattice lattice_of(const FlightConfig& config) noexcept;
 /// What the map has to hold: the flight's bounds and a margin in which surfaces are of interest.
 [[nodiscard]] Aabb map_bounds_W(const FlightConfig& config) noexcept;
 /// What a rig says of a flight: range, what is seen, the size of clouds.

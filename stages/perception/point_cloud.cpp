@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/precision.hpp"
 #include "core/random/counter_rng.hpp"
 #include "firmware_if/assert.hpp"
 
 namespace roborun::stages {
 
 PointCloud::PointCloud(const Config& config, core::Arena& arena) noexcept
-    : grid_(arena.take<Entry>(config.max_points, "cloud grid")),
+    : lattice_(config.lattice),
+      grid_(arena.take<Entry>(config.max_points, "cloud grid")),
       grid_pool_(arena.last_pool()),
       point_(arena.take<CloudPoint>(config.max_points, "cloud points")),
       point_pool_(arena.last_pool()),
@@ -58,7 +58,7 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core
   seen_volume_m3_ = 0.0;
   work = {};
   work.level = level;
-  const double cell_m = cell_size_m(level);
+  const double cell_m = lattice_.cell_size_m(level);
   guard_.begin(frames);
   std::size_t usable = 0;
   bool full = false;

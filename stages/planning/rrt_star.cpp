@@ -95,7 +95,7 @@ double RrtStar::detour_m(const PlanRequest& request, const MapView& view, const 
   const Vector3 side = request.radius_m * Vector3(-ahead.y(), ahead.x(), 0.0);
   const double reach_m = std::fmin(kLookAhead_m, distance_m);
   // Of a wall only the first layer of cells may be known.
-  const double step_m = std::fmax(kFinestCell_m, 0.5 * view.cell_m());
+  const double step_m = std::fmax(view.finest_m(), 0.5 * view.cell_m());
   for (double at_m = request.radius_m; at_m < reach_m; at_m += step_m) {
     for (const double share : {-1.0, 0.0, 1.0}) {
       if (view.at(p_W + at_m * ahead + share * side, lookups) != CellState::kOccupied) continue;

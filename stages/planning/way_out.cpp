@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "core/precision.hpp"
 #include "stages/perception/polled_view.hpp"
 
 namespace roborun::stages {
@@ -47,12 +46,13 @@ bool keeps_off(const Piece& piece, const Aabb& cell_W, double body_m) noexcept {
 bool keeps_off_all(const Piece& piece, const MapView& known, double body_m, std::uint64_t& lookups) noexcept {
   const Aabb box_W = Aabb::around(piece.from_W, body_m);
   const Vector3 inside = Vector3::Constant(kInside_m);
-  const auto first = [](double p) { return std::floor(p / kFinestCell_m); };
+  const double cell_m = known.finest_m();
+  const auto first = [cell_m](double p) { return std::floor(p / cell_m); };
   for (double z = first(box_W.min_W.z()); z <= first(box_W.max_W.z()); ++z) {
     for (double y = first(box_W.min_W.y()); y <= first(box_W.max_W.y()); ++y) {
       for (double x = first(box_W.min_W.x()); x <= first(box_W.max_W.x()); ++x) {
-        const Vector3 corner_W = kFinestCell_m * Vector3(x, y, z);
-        const Aabb cell_W{corner_W, corner_W + Vector3::Constant(kFinestCell_m)};
+        const Vector3 corner_W = cell_m * Vector3(x, y, z);
+        const Aabb cell_W{corner_W, corner_W + Vector3::Constant(cell_m)};
         if (known.is_free_at_finest({cell_W.min_W + inside, cell_W.max_W - inside}, lookups)) continue;
         if (!keeps_off(piece, cell_W, body_m)) return false;
       }

@@ -26,6 +26,7 @@ class StandingView final : public MapView {
     return view_.at(p_W, lookups);
   }
   [[nodiscard]] double cell_m() const noexcept override { return view_.cell_m(); }
+  [[nodiscard]] double finest_m() const noexcept override { return view_.finest_m(); }
 
  private:
   /// What of the box is not where the vehicle stands.
