@@ -338,6 +338,14 @@ void DecisionPipeline::choose(const DecisionInput& in, DecisionOutput& out) noex
   out.trajectory = *stop;
 }
 
+void DecisionPipeline::forget() noexcept {
+  map_.forget();
+  if (ways_ != nullptr) ways_->forget();
+  motion_ = {};
+  kept_W_.clear();
+  has_planned_ = false;
+}
+
 void DecisionPipeline::run(core::StageId id, const DecisionInput& in, DecisionOutput& out) noexcept {
   switch (id) {
     case core::StageId::kPointCloud:
