@@ -165,7 +165,12 @@ class ReplayedLidar final : public firmware_if::Lidar {
 class ReplayedAircraft final : public flight::Aircraft, private firmware_if::Motors {
  public:
   ReplayedAircraft(Recording& recording, FlightDigest& digest)
-      : recording_(recording), digest_(digest), imu_(recording), gnss_(recording), barometer_(recording), odometry_(recording) {}
+      : recording_(recording),
+        digest_(digest),
+        imu_(recording),
+        gnss_(recording),
+        barometer_(recording),
+        odometry_(recording) {}
   void begin_frame(MonotonicTime now) noexcept override {
     MonotonicTime recorded;
     each_field(Get(recording_.payload()), recorded);

@@ -383,11 +383,14 @@ void WayMemory::find_inner_doors(Block& b) noexcept {
   // The highest bit of each place's four: whether its room is open. So a row is one operation.
   static_assert(kFirstOpenRoom == 8 && kRooms == 16);
   constexpr std::uint64_t kHigh = 0x8888'8888'8888'8888ULL;
-  const auto open_places = [&b](std::int32_t y, std::int32_t z) {
-    return ((y | z) & ~15) != 0 ? 0 : b.rooms.number[static_cast<std::size_t>(16 * z + y)] & kHigh;
+  const auto row_of = [&b](std::int32_t y, std::int32_t z) {
+    return b.rooms.number[16 * static_cast<std::size_t>(z) + static_cast<std::size_t>(y)];
   };
-  const auto known_places = [&b](std::int32_t y, std::int32_t z) {
-    const std::uint64_t n = b.rooms.number[static_cast<std::size_t>(16 * z + y)];
+  const auto open_places = [&row_of](std::int32_t y, std::int32_t z) {
+    return ((y | z) & ~15) != 0 ? 0 : row_of(y, z) & kHigh;
+  };
+  const auto known_places = [&row_of](std::int32_t y, std::int32_t z) {
+    const std::uint64_t n = row_of(y, z);
     return (n << 1U | n << 2U | n << 3U) & ~n & kHigh;
   };
   const auto for_each = [&](const auto& what) {
