@@ -33,6 +33,23 @@ std::uint64_t digest_of(const CellBlock& cells) noexcept {
   return digest;
 }
 
+/// Of a row of places those in known rooms that have one in an open room beside them: the highest of each place's four bits, which says
+/// of a room whether it is open. So a row is one operation.
+std::uint64_t known_beside_open(const WayRooms& rooms, std::int32_t y, std::int32_t z) noexcept {
+  static_assert(kFirstOpenRoom == 8 && kRooms == 16);
+  constexpr std::uint64_t kHigh = 0x8888'8888'8888'8888ULL;
+  const auto row = [&rooms](std::int32_t at_y, std::int32_t at_z) {
+    return ((at_y | at_z) & ~15) != 0
+               ? 0
+               : rooms.number[16 * static_cast<std::size_t>(at_z) + static_cast<std::size_t>(at_y)];
+  };
+  const std::uint64_t n = row(y, z);
+  const std::uint64_t known = (n << 1U | n << 2U | n << 3U) & ~n;
+  const std::uint64_t beside =
+      n << 4U | n >> 4U | row(y - 1, z) | row(y + 1, z) | row(y, z - 1) | row(y, z + 1);
+  return known & beside & kHigh;
+}
+
 }  // namespace
 
 namespace {
@@ -380,26 +397,10 @@ void WayMemory::find_inner_doors(Block& b) noexcept {
     int count, x, y, z;
   };
   std::array<Pair, std::size_t{kFirstOpenRoom} * kFirstOpenRoom> pair{};
-  // The highest bit of each place's four: whether its room is open. So a row is one operation.
-  static_assert(kFirstOpenRoom == 8 && kRooms == 16);
-  constexpr std::uint64_t kHigh = 0x8888'8888'8888'8888ULL;
-  const auto row_of = [&b](std::int32_t y, std::int32_t z) {
-    return b.rooms.number[16 * static_cast<std::size_t>(z) + static_cast<std::size_t>(y)];
-  };
-  const auto open_places = [&row_of](std::int32_t y, std::int32_t z) {
-    return ((y | z) & ~15) != 0 ? 0 : row_of(y, z) & kHigh;
-  };
-  const auto known_places = [&row_of](std::int32_t y, std::int32_t z) {
-    const std::uint64_t n = row_of(y, z);
-    return (n << 1U | n << 2U | n << 3U) & ~n & kHigh;
-  };
-  const auto for_each = [&](const auto& what) {
+  const auto for_each = [&b](const auto& what) {
     for (std::int32_t i = 0; i < 256; ++i) {
       const std::int32_t y = i % 16, z = i / 16;
-      const std::uint64_t open = open_places(y, z);
-      const std::uint64_t beside_open = open << 4U | open >> 4U | open_places(y - 1, z) |
-                                        open_places(y + 1, z) | open_places(y, z - 1) | open_places(y, z + 1);
-      for (std::uint64_t bits = known_places(y, z) & beside_open; bits != 0; bits &= bits - 1) {
+      for (std::uint64_t bits = known_beside_open(b.rooms, y, z); bits != 0; bits &= bits - 1) {
         const std::int32_t x = std::countr_zero(bits) / 4;
         const unsigned room = b.rooms.at(x, y, z);
         const auto beside = [&](std::int32_t nx, std::int32_t ny, std::int32_t nz) {
