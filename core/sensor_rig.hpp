@@ -67,6 +67,7 @@ struct SensorRig {
   core::StaticVector<LidarSpec, kMostLidars> lidars{};
   ImuModel imu{};
   GnssModel gnss{};
+  OdometryModel odometry{};
 };
 
 /// One number of a sensor in a file.

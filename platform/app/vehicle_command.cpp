@@ -80,6 +80,7 @@ std::vector<std::string> models_of(const SensorRig& rig) {
   for (const LidarSpec& lidar : rig.lidars) add("lidar", lidar.model);
   add("imu", rig.imu);
   add("gnss", rig.gnss);
+  if (rig.odometry != OdometryModel::kNone) add("odometry", rig.odometry);
   return names;
 }
 

@@ -90,15 +90,17 @@ core::MeteredBudget DecisionPipeline::table_budget_of(core::StageId id) noexcept
 void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) noexcept {
   core::MeteredBudget budget = table_budget_of(core::StageId::kPointCloud);
   core::Work work;
-  (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), budget, work);
   const double r_m = radius_m();
   const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m),
                         config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
+  const stages::SpaceProfilerConfig profiler{.vehicle_width_m = 2.0 * config_.vehicle.radius_m};
+  stages::CloudNeed need = stages::needed_points(profiler, in.p_WB, relevant_W);
+  need.reach_m = std::fmax(need.reach_m, MotionWatch::kReach_m);
+  (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), need, budget, work);
   motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W}, cloud_.points(), map_.view(), budget, work);
   out.motion = motion_.moving(in.now);
-  (void)profile_space({.vehicle_width_m = 2.0 * config_.vehicle.radius_m}, cloud_.points(), map_.view(),
-                      *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W, relevant_W, r_m, out.profile,
-                      budget, work);
+  (void)profile_space(profiler, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB,
+                      in.goal_W, relevant_W, r_m, out.profile, budget, work);
   out.profile.sensor_volume_m3 = cloud_.seen_volume_m3();
   // What the map will hold once this decision's images are in it.
   out.profile.map_volume_m3 = map_.known_volume_m3() + cloud_.seen_volume_m3();
@@ -335,6 +337,14 @@ void DecisionPipeline::choose(const DecisionInput& in, DecisionOutput& out) noex
   if (!stop) return;
   out.kind = DecisionKind::kBrake;
   out.trajectory = *stop;
+}
+
+void DecisionPipeline::forget() noexcept {
+  map_.forget();
+  if (ways_ != nullptr) ways_->forget();
+  motion_ = {};
+  kept_W_.clear();
+  has_planned_ = false;
 }
 
 void DecisionPipeline::run(core::StageId id, const DecisionInput& in, DecisionOutput& out) noexcept {

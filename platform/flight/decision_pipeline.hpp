@@ -97,6 +97,9 @@ class DecisionPipeline {
   /// more, as tight as the vehicle can fly; that time is the planner's.
   /// RT-safe: no allocation; bounded by the stages' budgets.
   void run(core::StageId id, const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// Nothing is known any more: what was seen lies elsewhere. To be called between decisions. What is flown is then not free, so
+  /// that the next one brakes; hovering, the vehicle takes as much to be free around itself as at the top of its climb.
+  void forget() noexcept;
   /// Of the map, as the planner sees it but for the fence.
   [[nodiscard]] const stages::MapView& view() const noexcept { return map_.view(); }
   [[nodiscard]] const stages::OccupancyMap& map() const noexcept { return map_; }

@@ -106,6 +106,21 @@ void DecisionProgram::look_through_lidar(std::size_t lidar, const stages::PastSt
   }
 }
 
+DepthError place_error(const stages::EstimatedState& state) noexcept {
+  return {.constant_m = 0.0,
+          .quadratic_per_m = 0.0,
+          .place_m = std::max(state.map_sigma_m - kSureWithin_m, 0.0),
+          .angle_rad = std::max(state.map_sigma_rad - kSureWithin_rad, 0.0) + state.drift_ratio};
+}
+
+void DecisionProgram::blur(const stages::EstimatedState& state) noexcept {
+  const DepthError more = place_error(state);
+  for (stages::PosedDepthFrame& posed : frames_) {
+    posed.error.place_m += more.place_m;
+    posed.error.angle_rad += more.angle_rad;
+  }
+}
+
 void DecisionProgram::look(const stages::PastStates& past, bool airborne, MonotonicTime now) noexcept {
   frames_.clear();
   look_through_cameras(past);
@@ -146,7 +161,12 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
     lane.end_frame();
     return;
   }
+  if (state.map_number != map_number_) {
+    pipeline_.forget();
+    map_number_ = state.map_number;
+  }
   look(report.past, report.airborne, lane.release());
+  blur(state);
   publish(lane.release() + kIdlePeriod);
   if (frames_.empty()) {
     lane.set_period(4 * core::kMinorFrame);
@@ -162,21 +182,21 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
   const Vector3& goal_W = choose_goal(lane.release(), report);
   in_.goal_W = report.action == Action::kReturn ? report.home_W
                : report.action == Action::kLand ? state.p_WB  // close looks, slow
-                                                : goal_W;
+                                                : Vector3(goal_W - state.shift_W);
   in_.seed = core::mix64(config_.seed * 1000003ULL + ++decisions_);
 }
 
 const Vector3& DecisionProgram::choose_goal(MonotonicTime now, const FlightReport& report) noexcept {
   const stages::EstimatedState& state = report.state;
-  bool other = goals_.take(now, state.p_WB);
+  const Vector3 p_WB = state.p_WB + state.shift_W;  // where goals are given
+  bool other = goals_.take(now, p_WB);
   if (!other && report.airborne && report.action == Action::kGoOn) {
-    const bool reached =
-        (goals_.now_W() - state.p_WB).norm() < kReached_m && state.v_WB.norm() < kReached_mps;
+    const bool reached = (goals_.now_W() - p_WB).norm() < kReached_m && state.v_WB.norm() < kReached_mps;
     if (reached || is_goal_blocked() || has_no_way())
       other = goals_.next(reached             ? GoalAnswer::kReached
                           : is_goal_blocked() ? GoalAnswer::kBlocked
                                               : GoalAnswer::kNoWay,
-                          now, state.p_WB);
+                          now, p_WB);
   }
   if (other) no_way_ = goal_blocked_ = 0;
   return goals_.now_W();

@@ -47,6 +47,9 @@ class WayMemory {
   Status solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
                core::Work& work) noexcept;
 
+  /// Nothing is known of any way. RT-safe: O(size of the world).
+  void forget() noexcept;
+
   /// Metres of known way, after solve(); +inf where it did not come.
   [[nodiscard]] double to_goal_m(const Vector3& p_W) const noexcept;
   /// The way from a place: corners in known space one after the other, no farther than `within_m` from it, the last one
