@@ -20,10 +20,6 @@ constexpr double kReached_m = 1.0;
 constexpr double kReached_mps = 0.5;
 constexpr Nanos kLatestStop{20'000'000};  // 12 cm at 6 m/s
 
-bool looks_down(const stages::PosedDepthFrame& posed) noexcept {
-  return posed.X_WC.R_RT(2, 0) < -0.7;  // of its optical axis
-}
-
 }  // namespace
 
 DecisionProgram::DecisionProgram(const Config& config, DecisionPipeline& pipeline,
@@ -133,8 +129,8 @@ void DecisionProgram::look(const stages::PastStates& past, bool airborne, Monoto
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     const std::size_t sensor = sensor_of_[i];
     const bool usable = guard_.check(frames_[i]) == Status::kOk;
-    // From the ground, a camera that looks down sees nothing: all of it is nearer than its least range.
-    const bool may_be_dark = !airborne && frames_[i].frame.range_min_m > 0.0F && looks_down(frames_[i]);
+    // On the ground and close to it a camera may see nothing: all of it is nearer than its least range.
+    const bool may_be_dark = !airborne && frames_[i].frame.range_min_m > 0.0F;
     if (usable || may_be_dark) last_usable_[sensor] = frames_[i].frame.stamp;
     if (!usable) continue;
     ++scan[sensor < kMostCameras ? 0 : 1 + sensor - kMostCameras];
