@@ -124,6 +124,8 @@ int fly(const FlyOptions& options) {
   if (!options.world.empty()) {
     world = std::make_unique<sitl::World>(
         sitl::load_world(options.world, world_options(options.in_file, config.flight.vehicle.radius_m)));
+    if (const std::vector<Vector3> goals_W = goals_of(options.in_file); goals_W.size() > 1)
+      config.goals.push_back({0.0, goals_W});
     env = options.world;
     title = fmt::format("{}, seed {}", options.world, seed);
   } else {
@@ -135,6 +137,8 @@ int fly(const FlyOptions& options) {
     zone_m = named.knobs.spread_m;
     title = fmt::format("Environment {} ({}), {}, seed {}", named.number, named.name, options.mission, seed);
   }
+  for (const std::string& line : mission::beyond_reach(*world, config))
+    fmt::print(stderr, "roborun: {}\n", line);
   const board::Profile profile = profile_of(options);
   if (options.vehicle != "paper") title += fmt::format(", vehicle {}", options.vehicle);
   title += fmt::format(", cost profile {}", options.profile);
@@ -223,7 +227,8 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
       "  roborun fly                                   environment 14 with the aware design\n"
       "  roborun fly --design aware,static,static-fair --plot flight.svg\n"
       "  roborun fly --env 27 --seed 3 --profile host --json\n"
-      "  roborun fly --world house.bt --start 1,2,1.5 --goal 9,4,1.5\n\n"
+      "  roborun fly --world house.bt --start 1,2,1.5 --goal 9,4,1.5 --goal 2,7,1.5    one goal after the "
+      "other\n\n"
       "Exit code: 0 every design reached the goal, 1 at least one did not (the table says why), or a plugin "
       "took more\ntime than the work that it counts is worth, 2 bad input.");
   CLI::Option* env = fly_app

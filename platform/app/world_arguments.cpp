@@ -40,7 +40,8 @@ std::optional<Vector3> point_of(const char* option, const std::string& text) {
 
 void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
   command.add_option("--start", arguments.start, "With a world from a file: X,Y,Z in metres");
-  command.add_option("--goal", arguments.goal, "With a world from a file: X,Y,Z in metres");
+  command.add_option("--goal", arguments.goals, "With a world from a file: X,Y,Z in metres")
+      ->allow_extra_args(false);
   command.add_option(
       "--bounds", arguments.bounds,
       "Where the vehicle may be: X,Y,Z,X,Y,Z of two corners, in metres [what the file says, or all of it]");
@@ -54,10 +55,21 @@ void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
                    "Take meshes that are not closed, as surfaces without an inside");
 }
 
+std::vector<Vector3> goals_of(const WorldArguments& arguments) {
+  std::vector<Vector3> goals_W;
+  for (const std::string& goal : arguments.goals) {
+    const auto p_W = point_of("--goal", goal);
+    if (!p_W) throw InputError("--goal: '' is not a point: must be X,Y,Z in metres");
+    goals_W.push_back(*p_W);
+  }
+  return goals_W;
+}
+
 sitl::WorldOptions world_options(const WorldArguments& arguments, double radius_m) {
   sitl::WorldOptions options;
   options.start_W = point_of("--start", arguments.start);
-  options.goal_W = point_of("--goal", arguments.goal);
+  if (const std::vector<Vector3> goals_W = goals_of(arguments); !goals_W.empty())
+    options.goal_W = goals_W.front();
   if (const auto b = numbers<6>("--bounds", arguments.bounds, "a box: must be X,Y,Z,X,Y,Z in metres")) {
     options.bounds_W = Aabb{{(*b)[0], (*b)[1], (*b)[2]}, {(*b)[3], (*b)[4], (*b)[5]}};
     if (!(options.bounds_W->size().minCoeff() > 0.0))
@@ -74,7 +86,7 @@ sitl::WorldOptions world_options(const WorldArguments& arguments, double radius_
 }
 
 bool any_given(const WorldArguments& a) {
-  return !(a.start + a.goal + a.bounds + a.ground + a.cell).empty() || a.scale > 0.0 || a.surfaces;
+  return !(a.start + a.bounds + a.ground + a.cell).empty() || !a.goals.empty() || a.scale > 0.0 || a.surfaces;
 }
 
 }  // namespace roborun::app

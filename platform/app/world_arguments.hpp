@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <string>
+#include <vector>
 
 #include "platform/sitl/world/world_file.hpp"
 
@@ -10,7 +11,7 @@ namespace roborun::app {
 
 struct WorldArguments {
   std::string start;
-  std::string goal;
+  std::vector<std::string> goals;
   std::string bounds;
   std::string ground;
   std::string cell;
@@ -18,9 +19,11 @@ struct WorldArguments {
   bool surfaces{false};
 };
 
+/// Every --goal, in order. Throws InputError for one that is no point.
+[[nodiscard]] std::vector<Vector3> goals_of(const WorldArguments& arguments);
 /// Adds --start, --goal, --bounds, --ground, --cell, --scale and --surfaces. `arguments` must outlive the command.
 void add_world_arguments(CLI::App& command, WorldArguments& arguments);
-/// For a vehicle of this radius. Throws InputError that names the option.
+/// For a vehicle of this radius, with the first goal. Throws InputError that names the option.
 [[nodiscard]] sitl::WorldOptions world_options(const WorldArguments& arguments, double radius_m);
 /// Whether any of them was given.
 [[nodiscard]] bool any_given(const WorldArguments& arguments);

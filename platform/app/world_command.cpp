@@ -47,6 +47,7 @@ int check(const CheckOptions& options) {
   const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.vehicle);
   input::check_outputs({{"--plot", options.plot}}, {options.world, options.vehicle});
   const double body_m = vehicle.model.radius_m;
+  if (options.in_file.goals.size() > 1) throw InputError("--goal: must be one: a way leads to one goal");
   const sitl::World world = sitl::load_world(options.world, world_options(options.in_file, body_m));
   sitl::WayQuestion question;
   question.radius_m = body_m + options.margin_m;

@@ -280,6 +280,7 @@ void DecisionPipeline::remember(const DecisionInput& in, DecisionOutput& out) no
   if (status == Status::kOk) status = ways_->solve(draft_.start.p_W, in.goal_W, *draft_.planner_budget, work);
   ways_known_ = status == Status::kOk;
   out.no_way = status == Status::kNoPath;
+  out.goal_blocked = status == Status::kGoalBlocked;
   draft_.planner_work.units += work.units;
 }
 

@@ -78,8 +78,9 @@ struct DecisionOutput {
   core::StageArray<core::Work> work{};
   core::StageArray<Nanos> cost{};
   bool no_way{};  ///< All that can be reached was seen, and none of it leads to the goal (WayMemory::solve).
-  bool motion{};  ///< Something was seen to move nearby, not long ago.
-  Nanos latency{};  ///< Sum of the costs: when the result is there, counted from input.now.
+  bool goal_blocked{};  ///< No place of the vehicle is near the goal (WayMemory::solve).
+  bool motion{};        ///< Something was seen to move nearby, not long ago.
+  Nanos latency{};      ///< Sum of the costs: when the result is there, counted from input.now.
 };
 
 /// Runs the stages in the order of the frame table, each under the budget that the governor granted it.

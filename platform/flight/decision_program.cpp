@@ -16,11 +16,9 @@ namespace {
 constexpr int kReportDelay = 4;            // minor frames at most, from a commit to its report
 constexpr Nanos kIdlePeriod{100'000'000};  // of reports while there is nothing to decide
 constexpr double kHover_mps = 0.3;
+constexpr double kReached_m = 1.0;
+constexpr double kReached_mps = 0.5;
 constexpr Nanos kLatestStop{20'000'000};  // 12 cm at 6 m/s
-
-bool looks_down(const stages::PosedDepthFrame& posed) noexcept {
-  return posed.X_WC.R_RT(2, 0) < -0.7;  // of its optical axis
-}
 
 }  // namespace
 
@@ -29,7 +27,10 @@ DecisionProgram::DecisionProgram(const Config& config, DecisionPipeline& pipelin
                                  std::span<firmware_if::Lidar* const> lidars,
                                  const std::array<std::uint16_t, kMostLidars>& cloud_pixels,
                                  core::Arena& arena) noexcept
-    : config_(config), pipeline_(pipeline), mail_(mail) {
+    : config_(config),
+      goals_({config.bounds_W, config.fence, pipeline.radius_m()}, config.goal_W),
+      pipeline_(pipeline),
+      mail_(mail) {
   for (firmware_if::DepthCamera* camera : cameras) (void)cameras_.push_back(camera);
   for (firmware_if::Lidar* lidar : lidars) (void)lidars_.push_back(lidar);
   for (std::size_t i = 0; i < kMostLidars; ++i)
@@ -61,6 +62,9 @@ void DecisionProgram::judge() noexcept {
   const bool hovers =
       mail_.report.read().action == Action::kGoOn && !in_.climbing && in_.v_WB.norm() < kHover_mps;
   no_way_ = hovers && out_.no_way ? no_way_ + 1 : 0;
+  const bool stays = hovers && out_.kind != DecisionKind::kNew;
+  goal_blocked_ =
+      stays && (out_.goal_blocked || out_.planner_status == Status::kGoalBlocked) ? goal_blocked_ + 1 : 0;
   const std::uint64_t refusals = pipeline_.map().refusals();
   report_.map_refusals = refusals > refusals_before_ ? report_.map_refusals + 1 : 0;
   refusals_before_ = refusals;
@@ -125,8 +129,8 @@ void DecisionProgram::look(const stages::PastStates& past, bool airborne, Monoto
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     const std::size_t sensor = sensor_of_[i];
     const bool usable = guard_.check(frames_[i]) == Status::kOk;
-    // From the ground, a camera that looks down sees nothing: all of it is nearer than its least range.
-    const bool may_be_dark = !airborne && frames_[i].frame.range_min_m > 0.0F && looks_down(frames_[i]);
+    // On the ground and close to it a camera may see nothing: all of it is nearer than its least range.
+    const bool may_be_dark = !airborne && frames_[i].frame.range_min_m > 0.0F;
     if (usable || may_be_dark) last_usable_[sensor] = frames_[i].frame.stamp;
     if (!usable) continue;
     ++scan[sensor < kMostCameras ? 0 : 1 + sensor - kMostCameras];
@@ -171,10 +175,27 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
   in_.climbing = !report.airborne;
   in_.p_WB = state.p_WB;
   in_.v_WB = state.v_WB;
+  const Vector3& goal_W = choose_goal(lane.release(), report);
   in_.goal_W = report.action == Action::kReturn ? report.home_W
                : report.action == Action::kLand ? state.p_WB  // close looks, slow
-                                                : Vector3(config_.goal_W - state.shift_W);
+                                                : Vector3(goal_W - state.shift_W);
   in_.seed = core::mix64(config_.seed * 1000003ULL + ++decisions_);
+}
+
+const Vector3& DecisionProgram::choose_goal(MonotonicTime now, const FlightReport& report) noexcept {
+  const stages::EstimatedState& state = report.state;
+  const Vector3 p_WB = state.p_WB + state.shift_W;  // where goals are given
+  bool other = goals_.take(now, p_WB);
+  if (!other && report.airborne && report.action == Action::kGoOn) {
+    const bool reached = (goals_.now_W() - p_WB).norm() < kReached_m && state.v_WB.norm() < kReached_mps;
+    if (reached || is_goal_blocked() || has_no_way())
+      other = goals_.next(reached             ? GoalAnswer::kReached
+                          : is_goal_blocked() ? GoalAnswer::kBlocked
+                                              : GoalAnswer::kNoWay,
+                          now, p_WB);
+  }
+  if (other) no_way_ = goal_blocked_ = 0;
+  return goals_.now_W();
 }
 
 const Trajectory& DecisionProgram::flown(MonotonicTime now) const noexcept {

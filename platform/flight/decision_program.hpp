@@ -16,6 +16,7 @@
 #include "firmware_if/lidar.hpp"
 #include "platform/flight/decision_pipeline.hpp"
 #include "platform/flight/flight_config.hpp"
+#include "platform/flight/goal_queue.hpp"
 #include "platform/flight/lane_mail.hpp"
 #include "stages/perception/cloud_images.hpp"
 
@@ -35,9 +36,10 @@ inline constexpr double kSureWithin_rad = 0.025;
 class DecisionProgram final : public core::LaneProgram {
  public:
   struct Config {
-    Vector3 goal_W = Vector3::Zero();
+    Vector3 goal_W = Vector3::Zero();  ///< The first one; others are given in flight.
     std::uint64_t seed{1};
     core::Fence fence{};
+    Aabb bounds_W{};                                     ///< Of goals.
     Nanos minor_frame{core::kMinorFrame};                ///< Of the flight lane.
     std::array<DepthError, kMostCameras> depth_error{};  ///< FlightConfig::depth_error.
   };
@@ -52,8 +54,15 @@ class DecisionProgram final : public core::LaneProgram {
   /// The newest decision: complete once the smoother's slot has run.
   [[nodiscard]] const DecisionOutput& output() const noexcept { return out_; }
   [[nodiscard]] std::uint64_t decisions() const noexcept { return decisions_; }
-  /// Decisions in a row, hovering on the way to the mission's goal, whose memory of ways has none: some are proof.
-  [[nodiscard]] std::uint64_t no_way() const noexcept { return no_way_; }
+  /// So many decisions in a row, hovering on the way to the goal without anything better to do, answer it.
+  static constexpr std::uint64_t kProof = 5;
+  /// Of those that found no way to it, or no room at it.
+  [[nodiscard]] bool has_no_way() const noexcept { return no_way_ >= kProof; }
+  [[nodiscard]] bool is_goal_blocked() const noexcept { return goal_blocked_ >= kProof; }
+  /// Goals in the place of those that are not answered yet (GoalQueue::give); one thread.
+  [[nodiscard]] Status give_goals(std::span<const Vector3> goals_W) noexcept { return goals_.give(goals_W); }
+  /// For the decision lane's thread, or between the frames of a flight in lockstep.
+  [[nodiscard]] const GoalQueue& goals() const noexcept { return goals_; }
   /// Trajectories that came too late for their own start; never decreases.
   [[nodiscard]] std::uint64_t too_late() const noexcept { return too_late_; }
 
@@ -70,6 +79,8 @@ class DecisionProgram final : public core::LaneProgram {
   void blur(const stages::EstimatedState& state) noexcept;
   void choose_site() noexcept;
   void judge() noexcept;
+  /// The goal of this decision.
+  [[nodiscard]] const Vector3& choose_goal(MonotonicTime now, const FlightReport& report) noexcept;
   /// False if it is too late for it.
   bool hand_over(const Trajectory& trajectory, bool is_stop, const core::LaneExecutive& lane) noexcept;
   /// What the flight lane flies at `now`. What was handed over counts from its start on: the report of that
@@ -77,6 +88,7 @@ class DecisionProgram final : public core::LaneProgram {
   [[nodiscard]] const Trajectory& flown(MonotonicTime now) const noexcept;
 
   Config config_;
+  GoalQueue goals_;
   DecisionPipeline& pipeline_;
   core::StaticVector<firmware_if::DepthCamera*, kMostCameras> cameras_;
   LaneMail& mail_;
@@ -88,7 +100,8 @@ class DecisionProgram final : public core::LaneProgram {
   DecisionOutput out_{};
   std::uint64_t decisions_{0};
   std::uint64_t too_late_{0};
-  std::uint64_t no_way_{0};
+  std::uint64_t no_way_{0};        ///< Decisions in a row ...
+  std::uint64_t goal_blocked_{0};  ///< ... and these.
   std::atomic<bool> given_up_{false};
   Trajectory handed_over_{};
   DecisionReport report_{};

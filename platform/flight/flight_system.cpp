@@ -125,8 +125,9 @@ FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, 
                 ways_ ? &*ways_ : nullptr),
       control_(config.vehicle, seconds(config.minor_frame), gaze_of(config)),
       flight_program_({config.vehicle, config.fence, config.answers}, control_, aircraft, mail_),
-      decision_program_({config.goal_W, config.seed, config.fence, config.minor_frame, config.depth_error},
-                        pipeline_, cameras, mail_, lidars, config.cloud_pixels, arena) {
+      decision_program_(
+          {config.goal_W, config.seed, config.fence, config.bounds_W, config.minor_frame, config.depth_error},
+          pipeline_, cameras, mail_, lidars, config.cloud_pixels, arena) {
   control_.set_cruise_height(config.cruise_m);
 }
 

@@ -81,7 +81,8 @@ std::vector<core::CostProfile> prices_of(const MissionConfig& config) {
   return prices;
 }
 
-/// Start and goal must be inside the fence, with room.
+/// Start and goal must be inside the fence, with room; so must goals that are there before the flight, and inside the
+/// bounds.
 const MissionConfig& checked(const sitl::World& world, const MissionConfig& config) {
   const double room_m = planned_radius_m(config.flight.vehicle);
   for (const auto& [name, p_W] : {std::pair{"start", world.start_W()}, std::pair{"goal", world.goal_W()}}) {
@@ -89,6 +90,25 @@ const MissionConfig& checked(const sitl::World& world, const MissionConfig& conf
       throw InputError(
           fmt::format("fence: the {} ({:.2f}, {:.2f}, {:.2f}) must be inside, with {} m to spare", name,
                       p_W.x(), p_W.y(), p_W.z(), room_m));
+  }
+  for (const GivenGoals& given : config.goals) {
+    if (given.goals_W.empty() || given.goals_W.size() > flight::GoalQueue::kMost)
+      throw InputError(
+          fmt::format("goal: {} at once: must be 1 to {}", given.goals_W.size(), flight::GoalQueue::kMost));
+    if (given.at_s > 0.0) continue;
+    for (const Vector3& p_W : given.goals_W) {
+      const Aabb& bounds_W = world.bounds_W();
+      if (!bounds_W.contains(p_W))
+        throw InputError(
+            fmt::format("goal: ({:.2f}, {:.2f}, {:.2f}): must be inside the bounds, ({:g}, {:g}, {:g}) to "
+                        "({:g}, {:g}, {:g})",
+                        p_W.x(), p_W.y(), p_W.z(), bounds_W.min_W.x(), bounds_W.min_W.y(), bounds_W.min_W.z(),
+                        bounds_W.max_W.x(), bounds_W.max_W.y(), bounds_W.max_W.z()));
+      if (!config.flight.fence.allows(Aabb::around(p_W, room_m)))
+        throw InputError(
+            fmt::format("goal: ({:.2f}, {:.2f}, {:.2f}): must be inside the fence, with {} m to spare",
+                        p_W.x(), p_W.y(), p_W.z(), room_m));
+    }
   }
   return config;
 }
@@ -102,6 +122,9 @@ class MissionRun {
  private:
   [[nodiscard]] flight::FlightParts parts();
   void begin_faults();
+  /// Those that are due.
+  void give_goals();
+  void record_goals();
   /// Throws InputError for a planner of somebody else's that does not say what it does.
   void refuse_silence() const;
   void record_decision(const flight::DecisionOutput& out);
@@ -124,6 +147,8 @@ class MissionRun {
   flight::LockstepFlight flight_;
   flight::FlightSystem& system_;
   MissionJudge judge_;
+  std::size_t given_{0};  ///< Of config_.goals.
+  std::vector<report::GoalRecord> refused_;
   core::StateHash hash_;
   report::MissionReport report_;
   std::vector<double> latencies_s_;
@@ -180,6 +205,37 @@ void MissionRun::begin_faults() {
   if (faults_.empty()) return;
   aircraft_.set_mean_wind(faults_.mean_wind_W_mps());
   faults_.refuse_bricks(setup_.arena());
+}
+
+void MissionRun::give_goals() {
+  const double now_s = seconds(flight_.now().time_since_epoch());
+  for (; given_ < config_.goals.size() && config_.goals[given_].at_s <= now_s; ++given_) {
+    const std::vector<Vector3>& goals_W = config_.goals[given_].goals_W;
+    if (system_.decision_program().give_goals(goals_W) == Status::kOk) {
+      if (recorder_) recorder_->gave_goals(goals_W);
+      continue;
+    }
+    const Vector3& p_W = aircraft_.vehicle().state().p_WB;
+    for (const Vector3& goal_W : goals_W)
+      refused_.push_back({goal_W, "refused", now_s, (goal_W - p_W).norm()});
+  }
+}
+
+void MissionRun::record_goals() {
+  if (config_.goals.empty()) return;
+  const double end_s = seconds(flight_.now().time_since_epoch());
+  const Vector3& end_W = aircraft_.vehicle().state().p_WB;
+  for (const flight::Goal& goal : system_.decision_program().goals().told()) {
+    const bool answered = goal.answer != flight::GoalAnswer::kFlown;
+    const std::string& why = report_.result.reason;
+    report_.result.goals.push_back({goal.p_W,
+                                    answered                      ? to_string(goal.answer)
+                                    : report_.result.reached_goal ? "reached"
+                                                                  : why,
+                                    answered ? seconds(goal.at.time_since_epoch()) : end_s,
+                                    answered ? goal.distance_m : (goal.p_W - end_W).norm()});
+  }
+  report_.result.goals.insert(report_.result.goals.end(), refused_.begin(), refused_.end());
 }
 
 void MissionRun::record_decision(const flight::DecisionOutput& out) {
@@ -278,6 +334,7 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
   for (std::uint64_t frame = 0; reason == nullptr; ++frame) {
     const Vector3 before_W = aircraft_.vehicle().state().p_WB;
     begin_faults();
+    give_goals();
     const MonotonicTime now = flight_.now() + config_.flight.minor_frame;
     if (const flight::DecisionOutput* decision = flight_.step(faults_.computer(now))) {
       record_decision(*decision);
@@ -304,6 +361,7 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
   report_.result.reason = reason;
   report_.result.reached_goal = report_.result.reason == "reached_goal";
   report_.result.collided = judge_.collided();
+  record_goals();
   report_.pools = setup_.pools();
   report_.work = work_of(timed_map_, timed_planner_);
   if (config_.keep_known)

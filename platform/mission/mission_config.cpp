@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "platform/flight/failsafe_monitor.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/sitl/sensors/lidar.hpp"
 
@@ -53,6 +56,31 @@ void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle) {
     pattern = sitl::load_lidar_pattern(vehicle.patterns[i]);
     config.simulator.rig->lidars[i] = sitl::spec_of(pattern, vehicle.rig.lidars[i]);
   }
+}
+
+std::vector<std::string> beyond_reach(const sitl::World& world, const MissionConfig& config) {
+  const VehicleModel& vehicle = config.flight.vehicle;
+  const auto* const low =
+      std::find_if(flight::kFailsafeThresholds.begin(), flight::kFailsafeThresholds.end(),
+                   [](const auto& row) { return row.condition == governor::Condition::kBatteryLow; });
+  const double usable_J = low->limit * vehicle.battery_J;
+  std::vector<Vector3> goals_W{world.goal_W()};
+  for (const GivenGoals& given : config.goals)
+    if (given.at_s == 0.0) goals_W = given.goals_W;
+  std::vector<std::string> lines;
+  double way_m = 0.0;
+  Vector3 last_W = world.start_W();
+  for (const Vector3& goal_W : goals_W) {
+    way_m += (goal_W - last_W).norm();
+    last_W = goal_W;
+    const double needed_J = way_m / vehicle.speed_mps * sitl::hover_power_W(vehicle);
+    if (needed_J > usable_J)
+      lines.push_back(
+          fmt::format("goal ({:.2f}, {:.2f}, {:.2f}): beyond the battery's reach: {:.0f} m take {:.0f} kJ at "
+                      "least, and the failsafe turns back after {:.0f} kJ",
+                      goal_W.x(), goal_W.y(), goal_W.z(), way_m, 1e-3 * needed_J, 1e-3 * usable_J));
+  }
+  return lines;
 }
 
 Vector3 ground_below(const sitl::World& world) {

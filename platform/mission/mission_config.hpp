@@ -34,6 +34,12 @@ struct TimedFault {
   double for_s{1e6};
 };
 
+/// Goals that are given in flight, in the place of those that are not answered yet.
+struct GivenGoals {
+  double at_s{0.0};
+  std::vector<Vector3> goals_W{};  ///< In order; flight::GoalQueue::kMost at most.
+};
+
 /// A processor that is throttled in flight.
 struct SlowDown {
   /// From then on computing takes `factor` times as long; +infinity: never.
@@ -67,6 +73,7 @@ struct MissionConfig {
   double host_factor{1.0};  ///< flight.costs are so many times those of the machine that was measured.
   SlowDown slow_down{};
   JudgeConfig judge{};
+  std::vector<GivenGoals> goals{};   ///< Besides the world's, by time.
   std::vector<TimedFault> faults{};  ///< At most sitl::FaultLine::kMost.
   std::string record{};              ///< File for the recording of the flight; empty: none.
   bool keep_known{false};            ///< report.known, at the height of the world's start.
@@ -81,6 +88,9 @@ struct MissionConfig {
 void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle);
 /// Where the vehicle stands before the flight: on the first surface below the start.
 [[nodiscard]] Vector3 ground_below(const sitl::World& world);
+/// One line for each goal that the battery cannot reach, however it is flown: straight on at the vehicle's full speed
+/// more than what is left when the failsafe turns back is used.
+[[nodiscard]] std::vector<std::string> beyond_reach(const sitl::World& world, const MissionConfig& config);
 /// Of the images that the map will get.
 [[nodiscard]] board::ImageLimits image_limits(const MissionConfig& config);
 /// "aware", "static" or "static-fair". Throws InputError that names the option.

@@ -11,7 +11,6 @@ constexpr double kOwnApproach_mps = 0.3;  // less is swaying on the spot
 constexpr double kHolding_s = 5.0;        // of hovering, until a hold counts as the end
 constexpr double kHardTouchdown_mps = 2.0;
 constexpr double kMoved_m = 5.0;         // a way around may lead away from the goal
-constexpr std::uint64_t kProof = 5;      // decisions without a way
 constexpr double kOffGround_m = 0.5;     // higher than this over what it stood on: it has left it
 constexpr double kUneven_m = 0.3;        // how much ground may rise around where it stands
 constexpr double kGiveUpAfter_s = 60.0;  // what cannot even stop
@@ -57,12 +56,20 @@ bool MissionJudge::believes_to_have_arrived() const {
   if (config_.goal_within_m <= believed_m) return true;
   stages::EstimatedState state;
   return system_.control().estimator().state(state) == Status::kOk &&
-         (state.p_WB + state.shift_W - world_.goal_W()).norm() < believed_m;
+         (state.p_WB + state.shift_W - system_.decision_program().goals().now_W()).norm() < believed_m;
 }
 
 const char* MissionJudge::judge(MonotonicTime now) {
   const sitl::VehicleState& s = aircraft_.vehicle().state();
-  const double to_goal_m = (world_.goal_W() - s.p_WB).norm();
+  const flight::DecisionProgram& decisions = system_.decision_program();
+  const Vector3& goal_W = decisions.goals().now_W();
+  const double to_goal_m = (goal_W - s.p_WB).norm();
+  if (goal_W != goal_W_) {
+    goal_W_ = goal_W;
+    best_distance_m_ = to_goal_m;
+    moved_to_W_ = s.p_WB;
+    best_at_ = now;
+  }
   const governor::Action action = system_.pilot().action();
   watch(now);
   // The vehicle's body, a sphere of half its span; the ground counts once it has left it, unless it lands. What it
@@ -87,7 +94,8 @@ const char* MissionJudge::judge(MonotonicTime now) {
     if (s.battery_ratio <= 0.0 && s.on_ground) return "battery_empty";
     return seconds(now.time_since_epoch()) > config_.time_limit_s ? "time_limit" : nullptr;
   }
-  if (to_goal_m < config_.goal_within_m && s.v_WB.norm() < kReachedSpeed_mps && believes_to_have_arrived()) {
+  if (decisions.goals().is_last() && to_goal_m < config_.goal_within_m && s.v_WB.norm() < kReachedSpeed_mps &&
+      believes_to_have_arrived()) {
     return "reached_goal";
   }
   if (to_goal_m < best_distance_m_ - 0.5 || (s.p_WB - moved_to_W_).norm() > kMoved_m) {
@@ -97,7 +105,9 @@ const char* MissionJudge::judge(MonotonicTime now) {
   }
   if (s.battery_ratio <= 0.0) return "battery_empty";
   if (give_up_ == nullptr) {
-    if (system_.decision_program().no_way() >= kProof) give_up_ = "no_way";
+    if (decisions.goals().is_last() && decisions.has_no_way()) give_up_ = "no_way";
+    if (give_up_ == nullptr && decisions.goals().is_last() && decisions.is_goal_blocked())
+      give_up_ = "goal_blocked";
     if (give_up_ == nullptr && seconds(now - best_at_) > config_.no_progress_s) give_up_ = "gave_up";
     if (seconds(now.time_since_epoch()) > config_.time_limit_s) give_up_ = "time_limit";
     if (give_up_ == nullptr) return nullptr;

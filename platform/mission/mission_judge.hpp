@@ -49,6 +49,7 @@ class MissionJudge {
   bool left_ground_{false};
   double sink_mps_{0.0};
   double best_distance_m_{std::numeric_limits<double>::infinity()};
+  Vector3 goal_W_ = Vector3::Zero();  ///< Of the time before.
   Vector3 moved_to_W_ = Vector3::Zero();
   MonotonicTime best_at_{};
 };

@@ -194,6 +194,13 @@ void FlightRecorder::begin_frame(MonotonicTime now) noexcept {
   write(RecordKind::kFrame);
 }
 
+void FlightRecorder::gave_goals(std::span<const Vector3> goals_W) noexcept {
+  Put put(payload_);
+  for (const Vector3& p_W : goals_W)
+    for (int i = 0; i < 3; ++i) put(p_W[i]);
+  write(RecordKind::kGoals);
+}
+
 void FlightRecorder::decided(const flight::DecisionOutput& decision) noexcept {
   ++totals_.decisions;
   digest_.add(decision);

@@ -35,9 +35,10 @@ enum class RecordKind : std::uint32_t {
   kGiveUp,
   kEnd,
   kLidar,
-  kOdometry
+  kOdometry,
+  kGoals  ///< Goals given in flight.
 };
-inline constexpr std::size_t kRecordKinds = 11;
+inline constexpr std::size_t kRecordKinds = 12;
 
 /// What a flight did: every motor command, "motors off" and decision as they came, the map in the end.
 class FlightDigest {
@@ -69,6 +70,7 @@ class FlightRecorder final : private flight::Aircraft {
   [[nodiscard]] std::span<firmware_if::Lidar* const> lidars() noexcept { return lidars_; }
   void decided(const flight::DecisionOutput& decision) noexcept;
   void gave_up() noexcept { write(RecordKind::kGiveUp); }
+  void gave_goals(std::span<const Vector3> goals_W) noexcept;
   /// Throws InputError if anything could not be written so far.
   void check() const { file_.check(); }
   /// Only now the file has its name: without this call the file before stays.

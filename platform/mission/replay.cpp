@@ -18,6 +18,7 @@ constexpr std::uint32_t kMostLidar = kLidarHead + 256 * 4096 * 12;
 struct Size {
   std::uint32_t least, most;
 };
+constexpr std::uint32_t kGoal = 24;
 constexpr std::array<Size, kRecordKinds> kSizes{{{2, kMostStart},
                                                  {8, 8},
                                                  {60, 60},
@@ -28,7 +29,8 @@ constexpr std::array<Size, kRecordKinds> kSizes{{{2, kMostStart},
                                                  {0, 0},
                                                  {24, 24},
                                                  {kLidarHead, kMostLidar},
-                                                 {117, 117}}};
+                                                 {117, 117},
+                                                 {kGoal, flight::GoalQueue::kMost* kGoal}}};
 
 }  // namespace
 
@@ -238,7 +240,22 @@ ReplayResult replay_flight(const std::string& path, const std::function<void(dou
   setup.check();
   ReplayResult result;
   double told_s = 0.0;
-  while (recording.kind() == RecordKind::kFrame) {
+  const auto give_goals = [&] {
+    Get get(recording.payload());
+    std::vector<Vector3> goals_W;
+    while (get.rest().size() >= 3 * sizeof(double) && goals_W.size() < flight::GoalQueue::kMost) {
+      Vector3& p_W = goals_W.emplace_back();
+      for (int i = 0; i < 3; ++i) get(p_W[i]);
+    }
+    (void)flight->system().decision_program().give_goals(goals_W);
+    recording.next();
+  };
+  // They come before the frame from which on they are there.
+  while (recording.kind() == RecordKind::kFrame || recording.kind() == RecordKind::kGoals) {
+    if (recording.kind() == RecordKind::kGoals) {
+      give_goals();
+      continue;
+    }
     ++result.replayed.minor_frames;
     if (const flight::DecisionOutput* decision = flight->step(
             {.slower = recorded.slow_down.slower(flight->now() + recorded.flight.minor_frame)})) {
@@ -250,7 +267,8 @@ ReplayResult replay_flight(const std::string& path, const std::function<void(dou
       recording.next();
     }
     if (!recording.error().empty()) throw InputError(recording.error());
-    const bool all_read = recording.kind() == RecordKind::kFrame || recording.kind() == RecordKind::kEnd;
+    const bool all_read = recording.kind() == RecordKind::kFrame || recording.kind() == RecordKind::kGoals ||
+                          recording.kind() == RecordKind::kEnd;
     if (!all_read || !aircraft.same_inputs) {
       result.diverged_in = result.replayed.minor_frames;
       break;

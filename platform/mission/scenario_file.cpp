@@ -18,9 +18,9 @@
 namespace roborun::mission {
 namespace {
 
-constexpr std::array<const char*, 11> kOutcomes{"reached_goal", "landed",    "holding",    "terminated",
-                                                "killed",       "collision", "time_limit", "battery_empty",
-                                                "gave_up",      "no_way",    "struck"};
+constexpr std::array<const char*, 12> kOutcomes{"reached_goal", "landed",    "holding",      "terminated",
+                                                "killed",       "collision", "time_limit",   "battery_empty",
+                                                "gave_up",      "no_way",    "goal_blocked", "struck"};
 
 class ScenarioReader {
  public:
@@ -33,6 +33,7 @@ class ScenarioReader {
  private:
   void read_head(Scenario& s) const;
   void read_faults(Scenario& s) const;
+  void read_goals(Scenario& s) const;
   void read_expectation(Scenario& s) const;
   std::string text(const toml::node& node, std::string_view key) const {
     const auto value = node.value_exact<std::string>();
@@ -157,6 +158,25 @@ void ScenarioReader::read_faults(Scenario& s) const {
   }
 }
 
+void ScenarioReader::read_goals(Scenario& s) const {
+  const toml::node* list = root_.get("goal");
+  if (list == nullptr) return;
+  if (list->as_array() == nullptr) reader_.refuse(*list, "goal", "must be written as [[goal]]");
+  for (const toml::node& node : *list->as_array()) {
+    const toml::table* goal = node.as_table();
+    if (goal == nullptr) reader_.refuse(node, "goal", "must be written as [[goal]]");
+    reader_.allow_keys(*goal, "[[goal]]", {"at_s", "position_m"});
+    const double at_s = maybe(*goal, "at_s", 7200).value_or(0.0);
+    const Vector3 p_W = reader_.point(reader_.need(*goal, "position_m", "[[goal]]"), "position_m");
+    std::vector<GivenGoals>& given = s.config.goals;
+    if (!given.empty() && at_s < given.back().at_s)
+      reader_.refuse(node, "at_s", "must not be before that of the [[goal]] above");
+    // Those of one instant are flown to one after the other.
+    if (given.empty() || at_s > given.back().at_s) given.push_back({at_s, {}});
+    given.back().goals_W.push_back(p_W);
+  }
+}
+
 void ScenarioReader::read_expectation(Scenario& s) const {
   const toml::table& t = table("expect");
   reader_.allow_keys(t, "[expect]",
@@ -185,7 +205,7 @@ void ScenarioReader::read_expectation(Scenario& s) const {
 
 Scenario ScenarioReader::read() {
   std::set<std::string_view> keys = kSettingsTables;
-  keys.insert({"scenario", "fault", "body", "expect"});
+  keys.insert({"scenario", "fault", "goal", "body", "expect"});
   reader_.allow_keys(root_, "the file", keys);
   Scenario s;
   s.name = std::filesystem::path(path_).stem().string();
@@ -196,6 +216,7 @@ Scenario ScenarioReader::read() {
   read_head(s);
   read_settings(reader_, root_, s.config);
   read_faults(s);
+  read_goals(s);
   s.bodies = sitl::read_bodies(reader_, root_);
   read_expectation(s);
   return s;

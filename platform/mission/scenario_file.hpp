@@ -38,7 +38,7 @@ struct Scenario {
 /// relative to this one), seed, design, answers, cost_factor
 /// (of computing, against the paper's machine); those of a
 /// settings file (settings_file.hpp); any number of [[fault]] with component, kind, instance, phase, at_s,
-/// for_s; [[body]] as in a world file (body_reader.hpp); [expect] with the fields above. Throws
+/// for_s; [[goal]] position_m, at_s: goals in the place of those not answered yet, those of one instant in order; [[body]] as in a world file (body_reader.hpp); [expect] with the fields above. Throws
 /// InputError with file, line, key and what would be right.
 [[nodiscard]] Scenario load_scenario(const std::string& path);
 /// Flies it. Throws InputError for a world that cannot be flown.

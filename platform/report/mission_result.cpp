@@ -38,6 +38,11 @@ std::string to_json(const MissionResult& r) {
   json["mission"] = r.mission;
   json["reason"] = r.reason;
   json["speed_limit_mps"] = r.speed_limit_mps;
+  for (const GoalRecord& g : r.goals)
+    json["goals"].push_back({{"goal_m", {g.goal_W.x(), g.goal_W.y(), g.goal_W.z()}},
+                             {"answer", g.answer},
+                             {"time_s", g.time_s},
+                             {"distance_m", g.distance_m}});
   if (r.suite) {
     json["possible"] = r.suite->possible;
     json["shortest_m"] = r.suite->shortest_m;

@@ -26,6 +26,14 @@ struct SuiteFlight {
   std::string command;  ///< That flies it again.
 };
 
+/// One goal of several, and what became of it.
+struct GoalRecord {
+  Vector3 goal_W = Vector3::Zero();
+  std::string answer;  ///< reached, goal_blocked, no_way, replaced, refused, or why the mission ended before.
+  double time_s{};     ///< Of the answer.
+  double distance_m{};  ///< From the vehicle then.
+};
+
 /// Names and order are those of the JSON object.
 struct MissionResult {
   std::string design;
@@ -51,9 +59,10 @@ struct MissionResult {
   std::string map;
   std::string planner;
   std::string mission;
-  std::string reason;        ///< Why the mission ended.
-  double speed_limit_mps{};  ///< v_max of the design.
-  bool believed{true};       ///< False: a plugin took more time than the work that it counted is worth.
+  std::string reason;             ///< Why the mission ended.
+  double speed_limit_mps{};       ///< v_max of the design.
+  bool believed{true};            ///< False: a plugin took more time than the work that it counted is worth.
+  std::vector<GoalRecord> goals;  ///< One more key, or none: a mission with the world's goal alone.
   std::optional<SuiteFlight> suite;  ///< Three more keys, or none.
 };
 

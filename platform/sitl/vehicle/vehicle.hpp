@@ -32,6 +32,9 @@ struct VehicleState {
   bool on_ground{true};
 };
 
+/// What it takes from its battery while it hovers.
+[[nodiscard]] double hover_power_W(const VehicleModel& model) noexcept;
+
 /// Deterministic: own random numbers, no libm. One minor frame costs well under 2 us.
 class Vehicle final : public firmware_if::Motors {
  public:
@@ -53,7 +56,6 @@ class Vehicle final : public firmware_if::Motors {
 
  private:
   void substep(double dt_s) noexcept;
-  [[nodiscard]] double electrical_power_W(double thrust_N, double axial_mps) const noexcept;
 
   VehicleModel model_;
   WindConfig wind_;
