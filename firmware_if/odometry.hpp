@@ -15,10 +15,10 @@ namespace roborun::firmware_if {
 struct OdometrySample {
   MonotonicTime stamp{};  ///< Instant of validity; the sample arrives later.
   std::uint32_t sequence{};
-  std::uint8_t reset_counter{};                      ///< Another number: O is another frame than before.
-  std::array<double, 3> p_OB_m{};                    ///< Of the body (FLU).
-  std::array<double, 4> q_OB{1.0, 0.0, 0.0, 0.0};    ///< w, x, y, z; of length 1 within 1 %.
-  std::array<double, 3> v_OB_mps{};                  ///< Expressed in O.
+  std::uint8_t reset_counter{};                    ///< Another number: O is another frame than before.
+  std::array<double, 3> p_OB_m{};                  ///< Of the body (FLU).
+  std::array<double, 4> q_OB{1.0, 0.0, 0.0, 0.0};  ///< w, x, y, z; of length 1 within 1 %.
+  std::array<double, 3> v_OB_mps{};                ///< Expressed in O.
   // Square roots of the largest entries of both covariances, without the drift since the reset.
   double sigma_position_m{};
   double sigma_attitude_rad{};

@@ -4,17 +4,17 @@
 #include <array>
 #include <cmath>
 
-#include "core/precision.hpp"
-
 namespace roborun::flight {
 namespace {
 
 constexpr std::size_t kSide = 16;  // samples of a row, and of a column
 constexpr double kReach_m = 10.0;
 constexpr double kNear_m = 1.0;
+constexpr double kBeside_m = 0.6;  // what an estimate of centimetres and cells of 0.3 m may be off by
 constexpr double kSigmas = 3.0;
 constexpr int kLeastSurfaces = 6;  // of a part that counts
-constexpr int kLeastParts = 2;
+constexpr int kLeastParts = 3;
+constexpr int kLeastOfAll = 64;  // a quarter of the image: a body in front of the open sky is no measure of a mount
 
 struct Part {
   int surfaces{0}, contradictions{0};
@@ -36,8 +36,9 @@ Agreement agreement_of(const stages::PosedDepthFrame& posed, const stages::MapVi
           1.0, (1.0 - (2.0 * static_cast<double>(u) + 1.0) / f.width) * static_cast<double>(f.tan_half_width),
           (1.0 - (2.0 * static_cast<double>(v) + 1.0) / f.height) * static_cast<double>(f.tan_half_height));
       const Vector3 p_W = posed.X_WC * Vector3(depth_m * ray_C);
-      const double sigma_m = posed.error.at_m(depth_m) + posed.error.place_m + posed.error.angle_rad * depth_m;
-      const double half_m = std::max(2.0 * kFinestCell_m, kSigmas * sigma_m);
+      const double sigma_m =
+          posed.error.at_m(depth_m) + posed.error.place_m + posed.error.angle_rad * depth_m;
+      const double half_m = std::max(kBeside_m, kSigmas * sigma_m);
       Part& of = part[2 * (2 * j / kSide) + 2 * i / kSide];
       ++of.surfaces;
       if (known.is_free_at_finest(Aabb::around(p_W, half_m), lookups)) ++of.contradictions;
@@ -53,7 +54,7 @@ Agreement agreement_of(const stages::PosedDepthFrame& posed, const stages::MapVi
     all.contradictions += p.contradictions;
     everywhere = everywhere && 8 * p.contradictions >= p.surfaces;
   }
-  if (parts < kLeastParts) return Agreement::kUnknown;
+  if (parts < kLeastParts || all.surfaces < kLeastOfAll) return Agreement::kUnknown;
   return everywhere && 3 * all.contradictions >= all.surfaces ? Agreement::kDisagrees : Agreement::kAgrees;
 }
 

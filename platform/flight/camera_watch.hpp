@@ -10,14 +10,14 @@
 namespace roborun::flight {
 
 enum class Agreement : std::uint8_t {
-  kUnknown,    ///< Too few surfaces nearby, or in space of which nothing is known.
+  kUnknown,  ///< Too few surfaces nearby, or in space of which nothing is known.
   kAgrees,
   kDisagrees,  ///< In every part of the image that shows surfaces, many lie where the map knows free space.
 };
 
-/// 256 pixels in four parts of the image, those that show a surface within 10 m: it contradicts the map if all within two cells
+/// 256 pixels in four parts of the image, those that show a surface within 10 m: it contradicts the map if all within 0.6 m
 /// of it, and three sigma of its depth, is known to be free. What moves fills a part of the image, a turned camera errs in all of
-/// them: an eighth of each part's surfaces, and a third of all. Precondition: check_shape(posed) is kOk. RT-safe: O(1).
+/// them: at least three, and a quarter of the image in all; an eighth of each part's surfaces, and a third of all. Precondition: check_shape(posed) is kOk. RT-safe: O(1).
 [[nodiscard]] Agreement agreement_of(const stages::PosedDepthFrame& posed,
                                      const stages::MapView& known) noexcept;
 

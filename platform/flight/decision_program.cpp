@@ -159,7 +159,8 @@ void DecisionProgram::look(const FlightReport& report, MonotonicTime now) noexce
     const bool usable = fault_[i] == stages::FrameFault::kNone;
     last_fault_[sensor] = fault_[i];
     // From the ground, a camera that looks down sees nothing: all of it is nearer than its least range.
-    const bool may_be_dark = !report.airborne && frames_[i].frame.range_min_m > 0.0F && looks_down(frames_[i]);
+    const bool may_be_dark =
+        !report.airborne && frames_[i].frame.range_min_m > 0.0F && looks_down(frames_[i]);
     if (usable || may_be_dark) last_usable_[sensor] = frames_[i].frame.stamp;
     if (!usable) continue;
     ++scan[sensor < kMostCameras ? 0 : 1 + sensor - kMostCameras];

@@ -98,9 +98,10 @@ class DecisionProgram final : public core::LaneProgram {
   Trajectory handed_over_{};
   DecisionReport report_{};
   stages::FrameGuard guard_{};
-  std::array<MonotonicTime, kMostCameras + kMostLidars> last_usable_{};       ///< By sensor.
-  std::array<stages::FrameFault, kMostCameras + kMostLidars> last_fault_{};  ///< The same, of its newest image.
-  std::array<stages::FrameFault, kMostImages> fault_{};                      ///< By frame.
+  std::array<MonotonicTime, kMostCameras + kMostLidars> last_usable_{};  ///< By sensor.
+  std::array<stages::FrameFault, kMostCameras + kMostLidars>
+      last_fault_{};                                     ///< The same, of its newest image.
+  std::array<stages::FrameFault, kMostImages> fault_{};  ///< By frame.
   std::uint64_t refusals_before_{0};
   std::uint32_t map_number_{0};  ///< EstimatedState::map_number of what is in the map.
 };

@@ -12,10 +12,11 @@ namespace roborun::flight {
 struct FailsafeMeasures {
   double battery_used_ratio{};  ///< NaN: the battery's monitor says nothing usable.
   double outside_fence{};       ///< 1 if the estimated position is not permitted.
-  double position_age_s{};  ///< Of the newest fix, or odometry, that the filter took and that differs from the one before.
-  double depth_age_s{};     ///< Of the newest usable image of the camera that is worst off.
-  double esc_silence_s{};   ///< Of the ESC that is worst off.
-  double link_silence_s{};  ///< Since the operator was last heard.
+  double
+      position_age_s{};  ///< Of the newest fix, or odometry, that the filter took and that differs from the one before.
+  double depth_age_s{};           ///< Of the newest usable image of the camera that is worst off.
+  double esc_silence_s{};         ///< Of the ESC that is worst off.
+  double link_silence_s{};        ///< Since the operator was last heard.
   double tracking_error_ratio{};  ///< Distance from the reference over what plans keep free.
   double planner_failures{};      ///< Decisions in a row without a usable answer.
   double decision_late_s{};       ///< After the instant when the decision lane wanted to be back.

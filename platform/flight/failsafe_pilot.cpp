@@ -55,8 +55,7 @@ FailsafeMeasures FailsafePilot::measure(MonotonicTime now, const DecisionReport&
   // Heights only between climb and descent: both go through the floor.
   const bool low = !control_.airborne() || control_.descending();
   const Vector3 p_W = state.p_WB + state.shift_W;
-  const bool inside =
-      low ? config_.fence.allows_over_ground({p_W, p_W}) : config_.fence.allows(p_W);
+  const bool inside = low ? config_.fence.allows_over_ground({p_W, p_W}) : config_.fence.allows(p_W);
   m.outside_fence = inside ? 0.0 : 1.0;
   return m;
 }

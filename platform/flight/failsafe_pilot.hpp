@@ -19,7 +19,7 @@ struct FailsafeEvent {
   MonotonicTime time{};
   governor::Action action{};
   governor::ConditionSet conditions{};
-  governor::Phase phase{};  ///< In which it was decided.
+  governor::Phase phase{};      ///< In which it was decided.
   std::uint8_t depth_sensor{};  ///< DecisionReport, where Condition::kDepth holds.
   stages::FrameFault depth_fault{};
 };

@@ -63,7 +63,8 @@ void FlightControl::sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmwa
   for (int i = 0; i < kMost && gnss.read(fix) == Status::kOk; ++i) {
     const bool differs = fix.p_WB_m != fix_.p_WB_m || fix.v_WB_mps != fix_.v_WB_mps;
     fix_ = fix;
-    if (estimator_.update(fix) == Status::kOk && differs) last_position_ = std::max(last_position_, fix.stamp);
+    if (estimator_.update(fix) == Status::kOk && differs)
+      last_position_ = std::max(last_position_, fix.stamp);
   }
   firmware_if::BarometerSample pressure;
   for (int i = 0; i < kMost && barometer.read(pressure) == Status::kOk; ++i)

@@ -18,14 +18,16 @@ PipelineConfig pipeline_config(const FlightConfig& config) noexcept {
   pipeline.map_bounds_W = map_bounds_W(config);
   pipeline.level_view_ratio = config.level_view_ratio;
   pipeline.sees_all_around = config.sees_all_around;
+  pipeline.too_near_m = config.too_near_m;
   pipeline.horizon_m = config.camera_range_m - 1.0;
   pipeline.fence = config.fence;
+  pipeline.lattice = lattice_of(config);
   pipeline.minor_frame = config.minor_frame;
   return pipeline;
 }
 
 stages::WayMemory::Config way_config(const FlightConfig& config) noexcept {
-  return {config.bounds_W, planned_radius_m(config.vehicle), config.fence};
+  return {config.bounds_W, planned_radius_m(config.vehicle), lattice_of(config).finest_m, config.fence};
 }
 
 /// The published designs know their horizon alone.
@@ -53,7 +55,7 @@ Status FlightConfig::validate() const noexcept {
   const bool space_ok = is_finite(bounds_W.min_W) && is_finite(bounds_W.max_W) &&
                         bounds_W.size().minCoeff() > 0.0 && is_finite(goal_W) && std::isfinite(cruise_m);
   const bool sensors_ok = core::above(camera_range_m, 1.0, 200.0) &&
-                          core::above(level_view_ratio, 0.0, 100.0) &&
+                          core::above(level_view_ratio, 0.0, 100.0) && core::within(too_near_m, 0.0, 100.0) &&
                           core::above(gaze.yaw_rate_radps, 0.0, 3.0) &&
                           core::above(gaze.stuck_s, 0.0, 1000.0) && core::within(gaze.lead_s, 0.0, 10.0);
   const bool ok = out_of_bounds(vehicle) == nullptr && rate_ok && space_ok && sensors_ok &&
@@ -75,9 +77,15 @@ governor::GovernorConfig governor_config(const FlightConfig& config) noexcept {
   const double range_m = config.camera_range_m;
   const double height_m = map_bounds_W(config).size().z();
   g.sensor_volume_max_m3 = 4.0 * range_m * range_m * std::min(height_m, 2.0 * range_m);
-  g.coarsest_level = coarsest_level_within(config.bounds_W.size().z() / 3.0);
+  g.lattice = lattice_of(config);
+  g.coarsest_level = lattice_of(config).coarsest_level_within(config.bounds_W.size().z() / 3.0);
   g.minor_frame = config.minor_frame;
   return g;
+}
+
+PrecisionLattice lattice_of(const FlightConfig& config) noexcept {
+  const bool aware = config.design == governor::Design::kAware;
+  return aware ? PrecisionLattice{config.vehicle.finest_cell_m} : PrecisionLattice{};
 }
 
 Aabb map_bounds_W(const FlightConfig& config) noexcept {
@@ -89,6 +97,7 @@ void describe_sensors(const SensorRig& rig, FlightConfig& config) noexcept {
   config.camera_range_m = shortest_range_m(rig);
   config.sees_all_around = cameras_see_all_around(rig);
   config.level_view_ratio = level_view_ratio(rig);
+  config.too_near_m = too_near_m(rig);
   config.gaze.follows = !sees_horizon(rig);
   for (std::size_t i = 0; i < rig.cameras.size(); ++i)
     config.depth_error[i] = depth_error(rig.cameras[i].model);
@@ -108,7 +117,7 @@ FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, 
                            std::span<firmware_if::DepthCamera* const> cameras, const FlightParts& parts,
                            core::Arena& arena, std::span<firmware_if::Lidar* const> lidars) noexcept
     : map_((ROBORUN_ASSERT(config.validate() == Status::kOk), parts.map)),
-      cloud_({}, arena),
+      cloud_({.lattice = lattice_of(config)}, arena),
       ways_(ways_of(config, arena)),
       governor_(governor_config(config)),
       policy_(parts.policy != nullptr ? *parts.policy : governor_),

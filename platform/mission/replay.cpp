@@ -165,7 +165,12 @@ class ReplayedLidar final : public firmware_if::Lidar {
 class ReplayedAircraft final : public flight::Aircraft, private firmware_if::Motors {
  public:
   ReplayedAircraft(Recording& recording, FlightDigest& digest)
-      : recording_(recording), digest_(digest), imu_(recording), gnss_(recording), barometer_(recording), odometry_(recording) {}
+      : recording_(recording),
+        digest_(digest),
+        imu_(recording),
+        gnss_(recording),
+        barometer_(recording),
+        odometry_(recording) {}
   void begin_frame(MonotonicTime now) noexcept override {
     MonotonicTime recorded;
     each_field(Get(recording_.payload()), recorded);
@@ -225,8 +230,9 @@ ReplayResult replay_flight(const std::string& path, const std::function<void(dou
   std::vector<firmware_if::Lidar*> lidars;
   lidars.reserve(lidar.size());
   for (ReplayedLidar& l : lidar) lidars.push_back(&l);
-  FlightSetup setup(recorded.flight, recorded.backends,
-                    board::image_limits(recorded.sensors, recorded.flight.vehicle));
+  FlightSetup setup(
+      recorded.flight, recorded.backends,
+      board::image_limits(recorded.sensors, recorded.flight.vehicle, lattice_of(recorded.flight)));
   const auto flight = std::make_unique<flight::LockstepFlight>(recorded.flight, aircraft, cameras,
                                                                setup.parts(), setup.arena(), lidars);
   setup.check();

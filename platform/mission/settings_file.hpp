@@ -17,8 +17,8 @@ namespace roborun::mission {
 void load_settings(const std::string& path, MissionConfig& config);
 
 /// The same from a file that holds other tables too.
-inline const std::set<std::string_view> kSettingsTables{"camera",  "lidar",  "imu", "gnss", "odometry", "wind", "rain",
-                                                        "battery", "flight", "cpu", "fog",  "fence"};
+inline const std::set<std::string_view> kSettingsTables{
+    "camera", "lidar", "imu", "gnss", "odometry", "wind", "rain", "battery", "flight", "cpu", "fog", "fence"};
 void read_settings(const input::TomlReader& reader, const toml::table& root, MissionConfig& config);
 /// Every number of a settings file.
 [[nodiscard]] std::vector<input::KeyText> settings_keys();

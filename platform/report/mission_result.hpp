@@ -114,7 +114,7 @@ struct FailsafeRecord {
   std::string action;
   std::string phase;                    ///< In which it was decided.
   std::vector<std::string> conditions;  ///< That held then.
-  std::string sensor;                   ///< Of the condition depth: which one is worst off, and why. Or empty.
+  std::string sensor;  ///< Of the condition depth: which one is worst off, and why. Or empty.
 };
 
 /// What a flight with faults is judged by; all of it is the world's truth, not the vehicle's belief.

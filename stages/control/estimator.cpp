@@ -207,7 +207,8 @@ Status Estimator::update(const firmware_if::GnssFix& fix) noexcept {
     // The vehicle did not jump with them: the inertial sensors of this second would have felt it.
     fixes_agreed_ = fixes_agreed_ || accepted;
     if (!accepted && fixes_agreed_ && dp_m.norm() > gate_m &&
-        shift_.refuse(dp_m, largest_sigma_m(fix), config_.gate_sigma, fix.stamp) == FrameShift::Verdict::kJumped)
+        shift_.refuse(dp_m, largest_sigma_m(fix), config_.gate_sigma, fix.stamp) ==
+            FrameShift::Verdict::kJumped)
       ++counters_.jumps;
   }
   if (accepted) ++counters_.gnss;
@@ -249,8 +250,7 @@ Status Estimator::update(const firmware_if::BarometerSample& sample) noexcept {
     ++counters_.barometer;
     return Status::kOk;
   }
-  if (!correct(kPosition + 2, dz_m, config_.barometer_sigma_m))
-    return Status::kInvalidArgument;
+  if (!correct(kPosition + 2, dz_m, config_.barometer_sigma_m)) return Status::kInvalidArgument;
   ++counters_.barometer;
   reset_if_broken();
   return Status::kOk;
@@ -328,7 +328,7 @@ Status Estimator::update(const firmware_if::OdometrySample& sample) noexcept {
   odometry_stamp_ = sample.stamp;
   // What was lost for long has to agree with itself again, as at its start.
   const bool follows = follows_odometry(sample.stamp) && anchor_->reset_counter() == sample.reset_counter &&
-                 fits(innovation_of(sample, anchor_->in_W(in_O), *then));
+                       fits(innovation_of(sample, anchor_->in_W(in_O), *then));
   if (!follows) {
     ++counters_.refused_gate;
     if (!try_anchor(sample, in_O, *then)) return Status::kNotReady;
@@ -342,8 +342,7 @@ Status Estimator::update(const firmware_if::OdometrySample& sample) noexcept {
 }
 
 bool Estimator::place_frame(const firmware_if::GnssFix& fix, const Vector3& innovation_m) noexcept {
-  const auto verdict =
-      shift_.update(innovation_m, largest_sigma_m(fix), config_.gate_sigma, fix.stamp);
+  const auto verdict = shift_.update(innovation_m, largest_sigma_m(fix), config_.gate_sigma, fix.stamp);
   if (verdict == FrameShift::Verdict::kRefused) {
     ++counters_.refused_gate;
     return false;

@@ -25,12 +25,14 @@ struct EstimatedState {
   Vector3 v_WB = Vector3::Zero();
   Quaternion q_WB = Quaternion::Identity();
   Vector3 w_WB_B = Vector3::Zero();
-  double position_sigma_m{};  ///< Largest standard deviation of the three axes, on the earth: with odometry's drift.
+  double
+      position_sigma_m{};  ///< Largest standard deviation of the three axes, on the earth: with odometry's drift.
   /// Add to a place in W, the frame that is flown and mapped in: where satellite navigation says that it is.
   Vector3 shift_W = Vector3::Zero();
   /// Of p_WB and q_WB against what was mapped a moment ago: the largest of each three axes.
   double map_sigma_m{}, map_sigma_rad{};
-  double drift_ratio{};  ///< By which the flown frame drifts, per metre flown; 0 where nothing but GNSS holds it.
+  double
+      drift_ratio{};  ///< By which the flown frame drifts, per metre flown; 0 where nothing but GNSS holds it.
   /// Another number: nobody knows how far the vehicle is from where what was mapped before says.
   std::uint32_t map_number{};
 };
@@ -65,9 +67,8 @@ class Estimator {
       const bool ok = gyro_noise_radps > 0 && gyro_noise_radps <= 1 && accel_noise_mps2 > 0 &&
                       accel_noise_mps2 <= 10 && gyro_bias_walk_radps > 0 && gyro_bias_walk_radps <= 1 &&
                       accel_bias_walk_mps2 > 0 && accel_bias_walk_mps2 <= 1 && barometer_sigma_m > 0 &&
-                      barometer_sigma_m <= 100 && gate_sigma >= 3 && gate_sigma <= 20 &&
-                      drift_ratio > 0 && drift_ratio <= 0.2 &&
-                      imu_lost_after > Nanos{0} && oldest_fix > Nanos{0};
+                      barometer_sigma_m <= 100 && gate_sigma >= 3 && gate_sigma <= 20 && drift_ratio > 0 &&
+                      drift_ratio <= 0.2 && imu_lost_after > Nanos{0} && oldest_fix > Nanos{0};
       return ok ? Status::kOk : Status::kInvalidArgument;
     }
   };

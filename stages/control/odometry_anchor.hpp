@@ -22,7 +22,8 @@ struct OdometryState {
 class OdometryAnchor {
  public:
   OdometryAnchor() = default;
-  OdometryAnchor(const OdometryState& in_O, const PastStates::Past& then, std::uint8_t reset_counter) noexcept;
+  OdometryAnchor(const OdometryState& in_O, const PastStates::Past& then,
+                 std::uint8_t reset_counter) noexcept;
 
   [[nodiscard]] OdometryState in_W(const OdometryState& in_O) const noexcept;
   [[nodiscard]] std::uint8_t reset_counter() const noexcept { return reset_counter_; }

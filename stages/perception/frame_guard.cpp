@@ -121,7 +121,8 @@ FrameFault FrameGuard::judge_content(const PosedDepthFrame& posed) noexcept {
   const bool has_noise = posed.error.constant_m > 0.0 || posed.error.quadratic_per_m > 0.0;
   if (!in_time) return FrameFault::kStamp;
   const double informed = informed_ratio(posed);
-  if (informed < kLeastInformedRatio) return informed < kCoveredRatio ? FrameFault::kCovered : FrameFault::kFog;
+  if (informed < kLeastInformedRatio)
+    return informed < kCoveredRatio ? FrameFault::kCovered : FrameFault::kFog;
   return has_noise && frozen(posed.frame) ? FrameFault::kFrozen : FrameFault::kNone;
 }
 

@@ -31,9 +31,9 @@ enum class FrameFault : std::uint8_t {
   kShape,    ///< check_shape().
   kStamp,    ///< Of another time than the others of its scan.
   kCovered,  ///< Hardly any information where ground or floor must be: a lens that is covered or blinded, darkness, nonsense.
-  kFog,      ///< Too little of it (kLeastInformedRatio), but more than kCoveredRatio: fog, dust, a lens that is half covered.
-  kFrozen,   ///< The same as before, with another stamp.
-  kTurned,   ///< It disagrees with the map all over: not this guard's judgement, but that of who knows the map.
+  kFog,  ///< Too little of it (kLeastInformedRatio), but more than kCoveredRatio: fog, dust, a lens that is half covered.
+  kFrozen,  ///< The same as before, with another stamp.
+  kTurned,  ///< It disagrees with the map all over: not this guard's judgement, but that of who knows the map.
 };
 [[nodiscard]] constexpr const char* to_string(FrameFault fault) noexcept {
   constexpr std::array<const char*, 7> kName{"none", "shape", "stamp", "covered", "fog", "frozen", "turned"};

@@ -87,8 +87,8 @@ inline constexpr std::array<ComponentSpec, kComponentCount> kComponents = [] {
 }();
 // clang-format on
 inline constexpr std::array<const char*, 15> kFaultKindNames{
-    "none", "off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent", "on", "jump", "reset",
-    "covered", "turned", "fog", "rain"};
+    "none", "off",  "stuck", "garbage", "wrong",  "slow", "delayed", "intermittent",
+    "on",   "jump", "reset", "covered", "turned", "fog",  "rain"};
 
 struct Fault {
   Component component{};

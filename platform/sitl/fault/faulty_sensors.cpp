@@ -86,11 +86,13 @@ void turn(const firmware_if::DepthFrame& frame, std::vector<float>& depth_m) noe
   yaw << left.cos, -left.sin, 0.0, left.sin, left.cos, 0.0, 0.0, 0.0, 1.0;
   pitch << down.cos, 0.0, down.sin, 0.0, 1.0, 0.0, -down.sin, 0.0, down.cos;
   const Matrix3 R = yaw * pitch;
-  const auto across = static_cast<double>(frame.tan_half_width), along = static_cast<double>(frame.tan_half_height);
+  const auto across = static_cast<double>(frame.tan_half_width),
+             along = static_cast<double>(frame.tan_half_height);
   for (std::size_t v = 0; v < frame.height; ++v) {
     for (std::size_t u = 0; u < frame.width; ++u) {
-      const Vector3 ray = R * Vector3(1.0, across * (1.0 - (2.0 * static_cast<double>(u) + 1.0) / frame.width),
-                                      along * (1.0 - (2.0 * static_cast<double>(v) + 1.0) / frame.height));
+      const Vector3 ray =
+          R * Vector3(1.0, across * (1.0 - (2.0 * static_cast<double>(u) + 1.0) / frame.width),
+                      along * (1.0 - (2.0 * static_cast<double>(v) + 1.0) / frame.height));
       float& to = depth_m[v * frame.width + u];
       to = kNoValue;
       if (!(ray.x() > 0.0)) continue;
@@ -126,7 +128,8 @@ void wet(std::uint64_t number, const firmware_if::DepthFrame& frame, std::vector
   for (std::size_t k = 0; k < kDropsOnLens; ++k) {
     const std::size_t u0 = lens.below(frame.width), v0 = lens.below(frame.height);
     for (std::size_t v = v0 - std::min(v0, radius); v < std::min<std::size_t>(v0 + radius, frame.height); ++v)
-      for (std::size_t u = u0 - std::min(u0, radius); u < std::min<std::size_t>(u0 + radius, frame.width); ++u)
+      for (std::size_t u = u0 - std::min(u0, radius); u < std::min<std::size_t>(u0 + radius, frame.width);
+           ++u)
         depth_m[v * frame.width + u] = kNoValue;
   }
 }

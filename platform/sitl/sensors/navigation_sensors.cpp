@@ -39,7 +39,12 @@ double sky_ratio(const World& world, const Vector3& p_W) noexcept {
 }
 
 NavigationSensors::NavigationSensors(const NavigationSensorsConfig& config, std::uint64_t seed) noexcept
-    : config_(config), lattice_(seed), imu_rng_(seed, 3), gnss_rng_(seed, 4), barometer_rng_(seed, 5), odometry_(config.odometry, seed) {
+    : config_(config),
+      lattice_(seed),
+      imu_rng_(seed, 3),
+      gnss_rng_(seed, 4),
+      barometer_rng_(seed, 5),
+      odometry_(config.odometry, seed) {
   const bool product = config.imu != ImuModel::kClean;
   gyro_bias_B_radps_ = normal3(imu_rng_, product ? imu_errors_.gyro_bias_radps : config.gyro_bias_radps);
   accel_bias_B_mps2_ = normal3(imu_rng_, product ? imu_errors_.accel_bias_mps2 : config.accel_bias_mps2);

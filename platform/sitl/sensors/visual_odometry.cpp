@@ -65,8 +65,7 @@ void VisualOdometry::sample(MonotonicTime now, const VehicleState& state) noexce
   const Quaternion q_OB =
       (Quaternion(1.0, tilt.x(), tilt.y(), tilt.z()).normalized() * q_OW * state.q_WB).normalized();
   const Vector3 p_m = p_O_ + normal3(rng_, e.position_m);
-  const Vector3 v_mps =
-      q_OW.toRotationMatrix() * ((1.0 + scale_) * state.v_WB) + normal3(rng_, e.speed_mps);
+  const Vector3 v_mps = q_OW.toRotationMatrix() * ((1.0 + scale_) * state.v_WB) + normal3(rng_, e.speed_mps);
   firmware_if::OdometrySample s;
   s.stamp = now;
   s.sequence = ++sequence_;

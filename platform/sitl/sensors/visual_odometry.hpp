@@ -30,9 +30,9 @@ class VisualOdometry final : public firmware_if::Odometry {
   OdometryModel model_;
   OdometryErrors errors_{};
   core::CounterRng rng_;
-  double scale_{}, climb_{};     ///< Of the way flown.
+  double scale_{}, climb_{};  ///< Of the way flown.
   double yaw_error_rad_{0.0};
-  double frame_yaw_rad_{0.0};    ///< Of the world in O, without the error.
+  double frame_yaw_rad_{0.0};  ///< Of the world in O, without the error.
   Vector3 p_O_ = Vector3::Zero();
   Vector3 last_W_ = Vector3::Zero();
   bool begun_{false};

@@ -36,9 +36,7 @@ class Flight {
     const double s = std::fmax(t - 1.0, 0.0);
     return {s < 1.0 ? 0.5 * kSpeed_mps * s * s : kSpeed_mps * (s - 0.5), 0.0, 5.0};
   }
-  static Vector3 v_W(double t) {
-    return {kSpeed_mps * std::fmin(std::fmax(t - 1.0, 0.0), 1.0), 0.0, 0.0};
-  }
+  static Vector3 v_W(double t) { return {kSpeed_mps * std::fmin(std::fmax(t - 1.0, 0.0), 1.0), 0.0, 0.0}; }
   [[nodiscard]] firmware_if::OdometrySample odometry(MonotonicTime stamp) {
     const double t = seconds_of(stamp);
     const double c = core::cos(yaw_O_rad), s = core::sin(yaw_O_rad);
@@ -48,8 +46,8 @@ class Flight {
     firmware_if::OdometrySample o;
     o.stamp = stamp;
     o.reset_counter = resets;
-    o.p_OB_m = {c * p.x() - s * p.y() + jump_O_m.x() + noise(), s * p.x() + c * p.y() + jump_O_m.y() + noise(),
-                p.z() + jump_O_m.z() + noise()};
+    o.p_OB_m = {c * p.x() - s * p.y() + jump_O_m.x() + noise(),
+                s * p.x() + c * p.y() + jump_O_m.y() + noise(), p.z() + jump_O_m.z() + noise()};
     o.v_OB_mps = {c * v.x() - s * v.y(), s * v.x() + c * v.y(), noise()};
     o.q_OB = {core::cos(0.5 * yaw_O_rad), 0.0, 0.0, core::sin(0.5 * yaw_O_rad)};
     o.sigma_position_m = 0.02;
@@ -109,8 +107,7 @@ struct Steps {
   Vector3 before_W = Vector3::Zero();
   double before_s{-1.0};
   void operator()(double t, const EstimatedState& s) {
-    if (before_s >= 0.0)
-      most_m = std::fmax(most_m, (s.p_WB - before_W - (t - before_s) * s.v_WB).norm());
+    if (before_s >= 0.0) most_m = std::fmax(most_m, (s.p_WB - before_W - (t - before_s) * s.v_WB).norm());
     before_W = s.p_WB;
     before_s = t;
   }

@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "core/precision.hpp"
 #include "core/random/counter_rng.hpp"
 #include "stages/planning/fenced_view.hpp"
 #include "stages/planning/ompl_backend/ompl_backend.hpp"
@@ -281,7 +282,7 @@ TEST_F(RrtStarTest, GoesAsideOfAWallOfOneCellAhead) {
   test::BoxView view;
   view.free_W = {Vector3(-24, -24, 0), Vector3(2, 24, 12)};
   for (const double wall_m : {1.7, 1.8, 1.9}) {
-    view.occupied = {{Vector3(wall_m, -0.6, 0), Vector3(wall_m + kFinestCell_m, 0.6, 12)}};
+    view.occupied = {{Vector3(wall_m, -0.6, 0), Vector3(wall_m + kPublishedCell_m, 0.6, 12)}};
     const Status status = sut_.plan(request_to(Vector3(42, 0, 5)), view, unlimited_, result_);
     ASSERT_EQ(status, Status::kOk) << wall_m;
     EXPECT_GT(std::abs(result_.path_W.back().y()), 1.4) << wall_m;
@@ -309,23 +310,6 @@ TEST_F(RrtStarTest, PlanDoesNotAllocate) {
   (void)sut_.plan(request_to(Vector3(150, 0, 5)), view, unlimited_, result_);
   (void)sut_.plan(request_to(Vector3(18, 1, 5)), view, unlimited_, result_);
   EXPECT_EQ(scope.count(), 0U);
-}
-
-TEST_F(RrtStarTest, EscapesToTheNearestFreePlaceAndNeverThroughWhatIsOccupied) {
-  core::UnlimitedBudget unlimited;
-  PlanResult result;
-  test::BoxView wall = pillar_world();
-  wall.occupied = {{Vector3(0.5, -20, 0), Vector3(1.5, 20, 20)}};
-  PlanRequest r = request_to(Vector3(150, 0, 5));
-  r.start_W = Vector3(-0.2, 0, 5);  // 0.7 m from the wall, 0.9 are wanted
-  EXPECT_EQ(sut_.plan(r, wall, unlimited, result), Status::kStartBlocked);
-  ASSERT_EQ(result.path_W.size(), 2U);
-  EXPECT_EQ(result.path_W[0], r.start_W);
-  EXPECT_EQ(result.path_W[1], Vector3(-0.5, 0, 5)) << "the first free place in steps of a cell";
-  EXPECT_DOUBLE_EQ(result.cost_m, 0.3);
-  r.start_W = Vector3(1.0, 0, 5);
-  EXPECT_EQ(sut_.plan(r, wall, unlimited, result), Status::kStartBlocked);
-  EXPECT_TRUE(result.path_W.empty()) << "inside the wall every way out touches it";
 }
 
 TEST(FencedView, IsTheMapInsideTheFenceAndOccupiedOutside) {

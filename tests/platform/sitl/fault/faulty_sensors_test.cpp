@@ -74,7 +74,8 @@ TEST(FaultySensors, OdometryBeginsAnewElsewhereAndTurnedAndSaysSo) {
   EXPECT_NEAR(turn.norm(), 1.0, 1e-9);
   EXPECT_NEAR(turn.z() * turn.z() + turn.w() * turn.w(), 1.0, 1e-9);
   EXPECT_NEAR(2.0 * turn.z() * turn.w(), 1.0, 1e-9) << "a quarter to the left";
-  const Vector3 before(wanted[3].p_OB_m[0] - wanted[0].p_OB_m[0], wanted[3].p_OB_m[1] - wanted[0].p_OB_m[1], 0.0);
+  const Vector3 before(wanted[3].p_OB_m[0] - wanted[0].p_OB_m[0], wanted[3].p_OB_m[1] - wanted[0].p_OB_m[1],
+                       0.0);
   const Vector3 after(got[3].p_OB_m[0] - got[0].p_OB_m[0], got[3].p_OB_m[1] - got[0].p_OB_m[1], 0.0);
   EXPECT_LT((turn.toRotationMatrix() * before - after).norm(), 1e-9);
   EXPECT_EQ(got[0].reset_counter, wanted[0].reset_counter + 1);
