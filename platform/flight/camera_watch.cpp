@@ -14,7 +14,8 @@ constexpr double kBeside_m = 0.6;  // what an estimate of centimetres and cells 
 constexpr double kSigmas = 3.0;
 constexpr int kLeastSurfaces = 6;  // of a part that counts
 constexpr int kLeastParts = 3;
-constexpr int kLeastOfAll = 64;  // a quarter of the image: a body in front of the open sky is no measure of a mount
+// A quarter of the image: a body in front of the open sky is no measure of a mount.
+constexpr int kLeastOfAll = 64;
 
 struct Part {
   int surfaces{0}, contradictions{0};
