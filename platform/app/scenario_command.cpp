@@ -53,9 +53,11 @@ std::vector<std::string> files_of(const std::string& path) {
 json verdict_of(const mission::Scenario& scenario) {
   const report::MissionReport report = mission::fly_scenario(scenario);
   json actions = json::array();
-  for (const report::FailsafeRecord& r : report.safety.actions)
+  for (const report::FailsafeRecord& r : report.safety.actions) {
     actions.push_back(
         {{"time_s", r.time_s}, {"action", r.action}, {"phase", r.phase}, {"conditions", r.conditions}});
+    if (!r.sensor.empty()) actions.back()["sensor"] = r.sensor;
+  }
   const std::vector<std::string> complaints = mission::complaints_of(scenario, report);
   return {{"name", scenario.name},
           {"about", scenario.about},
@@ -68,6 +70,7 @@ json verdict_of(const mission::Scenario& scenario) {
           {"touchdown_mps", report.safety.touchdown_mps},
           {"landing_site_known", report.safety.landing_site_was_known},
           {"mission_time_s", report.result.mission_time_s},
+          {"goal_error_m", report.safety.goal_error_m},
           {"state_hash", report.result.state_hash}};
 }
 
@@ -194,7 +197,7 @@ void add_scenario_command(CLI::App& app, std::function<int()>& run) {
       "  condition = \"gnss\"              # that held when an action was decided\n"
       "  within_s = 1.5                  # from the first fault to the first action\n"
       "  touchdown_mps = 1.5             # motors_stop_within_s, home_within_m, goal_within_m, "
-      "landing_site_known\n\n"
+      "landing_site_known, sensor\n\n"
       "Exit code: 0 all passed, 1 at least one failed (its line says why), 2 bad input.");
   run_app->add_option("path", options->path, "A scenario file, or a folder of them")->required();
   run_app->add_option("--junit", options->junit, "Write the verdicts to this file as JUnit XML");

@@ -4,6 +4,7 @@
 
 #include "core/geometry/camera_pose.hpp"
 #include "core/random/counter_rng.hpp"
+#include "platform/flight/camera_watch.hpp"
 #include "platform/flight/landing_site.hpp"
 
 namespace roborun::flight {
@@ -117,20 +118,52 @@ void DecisionProgram::blur(const stages::EstimatedState& state) noexcept {
   }
 }
 
-void DecisionProgram::look(const stages::PastStates& past, bool airborne, MonotonicTime now) noexcept {
-  frames_.clear();
-  look_through_cameras(past);
-  for (std::size_t i = 0; i < lidars_.size(); ++i) look_through_lidar(i, past);
+void DecisionProgram::judge_frames(bool airborne) noexcept {
   // The same judge as in point cloud and map: what it refuses counts as not seen, for the failsafe too.
   guard_.begin({frames_.begin(), frames_.size()});
+  std::array<bool, kMostImages> disagrees{};
+  int disagree = 0, agree = 0;
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    fault_[i] = guard_.judge(frames_[i]);
+    if (!airborne || fault_[i] != stages::FrameFault::kNone || frames_[i].is_cloud) continue;
+    const Agreement agreement = agreement_of(frames_[i], pipeline_.view());
+    disagrees[i] = agreement == Agreement::kDisagrees;
+    disagree += disagrees[i] ? 1 : 0;
+    agree += agreement == Agreement::kAgrees ? 1 : 0;
+  }
+  if (disagree > 1 && agree == 0) return pipeline_.forget();
+  for (std::size_t i = 0; i < frames_.size(); ++i)
+    if (disagrees[i]) fault_[i] = stages::FrameFault::kTurned;
+}
+
+void DecisionProgram::report_depth(MonotonicTime now) noexcept {
+  report_.depth_age_s = 0.0;
+  const auto consider = [&](std::size_t sensor) {
+    const double age_s = seconds(now - last_usable_[sensor]);
+    if (age_s <= report_.depth_age_s) return;
+    report_.depth_age_s = age_s;
+    report_.depth_sensor = static_cast<std::uint8_t>(sensor);
+    report_.depth_fault = last_fault_[sensor];
+  };
+  for (std::size_t i = 0; i < cameras_.size(); ++i) consider(i);
+  for (std::size_t i = 0; i < lidars_.size(); ++i) consider(kMostCameras + i);
+}
+
+void DecisionProgram::look(const FlightReport& report, MonotonicTime now) noexcept {
+  frames_.clear();
+  look_through_cameras(report.past);
+  for (std::size_t i = 0; i < lidars_.size(); ++i) look_through_lidar(i, report.past);
+  blur(report.state);
+  judge_frames(report.airborne);
   std::size_t kept = 0;
   in_.scans.clear();
   std::array<std::size_t, 1 + kMostLidars> scan{};
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     const std::size_t sensor = sensor_of_[i];
-    const bool usable = guard_.check(frames_[i]) == Status::kOk;
+    const bool usable = fault_[i] == stages::FrameFault::kNone;
+    last_fault_[sensor] = fault_[i];
     // On the ground and close to it a camera may see nothing: all of it is nearer than its least range.
-    const bool may_be_dark = !airborne && frames_[i].frame.range_min_m > 0.0F;
+    const bool may_be_dark = !report.airborne && frames_[i].frame.range_min_m > 0.0F;
     if (usable || may_be_dark) last_usable_[sensor] = frames_[i].frame.stamp;
     if (!usable) continue;
     ++scan[sensor < kMostCameras ? 0 : 1 + sensor - kMostCameras];
@@ -139,11 +172,7 @@ void DecisionProgram::look(const stages::PastStates& past, bool airborne, Monoto
   frames_.truncate(kept);
   for (const std::size_t images : scan)
     if (images > 0) (void)in_.scans.push_back(images);
-  report_.depth_age_s = 0.0;
-  for (std::size_t i = 0; i < cameras_.size(); ++i)
-    report_.depth_age_s = std::max(report_.depth_age_s, seconds(now - last_usable_[i]));
-  for (std::size_t i = 0; i < lidars_.size(); ++i)
-    report_.depth_age_s = std::max(report_.depth_age_s, seconds(now - last_usable_[kMostCameras + i]));
+  report_depth(now);
 }
 
 void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
@@ -161,8 +190,7 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
     pipeline_.forget();
     map_number_ = state.map_number;
   }
-  look(report.past, report.airborne, lane.release());
-  blur(state);
+  look(report, lane.release());
   publish(lane.release() + kIdlePeriod);
   if (frames_.empty()) {
     lane.set_period(4 * core::kMinorFrame);

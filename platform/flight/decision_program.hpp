@@ -70,7 +70,12 @@ class DecisionProgram final : public core::LaneProgram {
   void gather(core::LaneExecutive& lane) noexcept;
   /// Reads all sensors: frames_ are the images that may be used, and the depth's age is that of the sensor
   /// that is worst off.
-  void look(const stages::PastStates& past, bool airborne, MonotonicTime now) noexcept;
+  void look(const FlightReport& report, MonotonicTime now) noexcept;
+  /// fault_ of what was read. One camera that disagrees with the map all over while another one agrees, or that is the only one that
+  /// can tell, was turned: its images are not believed. If all disagree, it is the estimate: the map is dropped.
+  void judge_frames(bool airborne) noexcept;
+  /// The sensor that is worst off, for the failsafe.
+  void report_depth(MonotonicTime now) noexcept;
   /// Adds the newest images of all cameras, or those of a LiDAR's newest sweep.
   void look_through_cameras(const stages::PastStates& past) noexcept;
   void look_through_lidar(std::size_t lidar, const stages::PastStates& past) noexcept;
@@ -107,6 +112,9 @@ class DecisionProgram final : public core::LaneProgram {
   DecisionReport report_{};
   stages::FrameGuard guard_{};
   std::array<MonotonicTime, kMostCameras + kMostLidars> last_usable_{};  ///< By sensor.
+  std::array<stages::FrameFault, kMostCameras + kMostLidars>
+      last_fault_{};                                     ///< The same, of its newest image.
+  std::array<stages::FrameFault, kMostImages> fault_{};  ///< By frame.
   std::uint64_t refusals_before_{0};
   std::uint32_t map_number_{0};  ///< EstimatedState::map_number of what is in the map.
 };

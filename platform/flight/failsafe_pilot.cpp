@@ -39,6 +39,8 @@ FailsafeMeasures FailsafePilot::measure(MonotonicTime now, const DecisionReport&
   m.killed = health.killed ? 1.0 : 0.0;
   if (d.heard) {
     m.depth_age_s = d.depth_age_s;
+    depth_sensor_ = d.depth_sensor;
+    depth_fault_ = d.depth_fault;
     m.planner_failures = d.failures;
     m.decision_late_s = seconds(now - d.due);
     m.map_refusals = d.map_refusals;
@@ -79,7 +81,7 @@ void FailsafePilot::begin(Action action, MonotonicTime now) noexcept {
   if (action == Action::kHold || action == Action::kLand) control_.brake();
   if (action == Action::kTerminate) aircraft_.terminate();
   action_since_ = now;
-  (void)events_.push_back({now, action, conditions_, phase_});
+  (void)events_.push_back({now, action, conditions_, phase_, depth_sensor_, depth_fault_});
 }
 
 void FailsafePilot::come_home(MonotonicTime now) noexcept {

@@ -19,7 +19,9 @@ struct FailsafeEvent {
   MonotonicTime time{};
   governor::Action action{};
   governor::ConditionSet conditions{};
-  governor::Phase phase{};  ///< In which it was decided.
+  governor::Phase phase{};      ///< In which it was decided.
+  std::uint8_t depth_sensor{};  ///< DecisionReport, where Condition::kDepth holds.
+  stages::FrameFault depth_fault{};
 };
 
 /// Belongs to the flight lane's thread. RT-safe: O(1), no allocation.
@@ -59,6 +61,8 @@ class FailsafePilot {
   governor::Phase phase_{governor::Phase::kGround};
   governor::Action action_{governor::Action::kGoOn};
   governor::ConditionSet conditions_{0};
+  std::uint8_t depth_sensor_{0};
+  stages::FrameFault depth_fault_{};
   core::StaticVector<FailsafeEvent, 2 * governor::kActionCount> events_;
   MonotonicTime operator_heard_{};
   MonotonicTime action_since_{};

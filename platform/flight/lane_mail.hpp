@@ -7,6 +7,7 @@
 #include "firmware_if/time.hpp"
 #include "governor/failsafe/arbiter.hpp"
 #include "stages/control/estimator.hpp"
+#include "stages/perception/frame_guard.hpp"
 
 namespace roborun::flight {
 
@@ -37,6 +38,10 @@ struct DecisionReport {
   bool heard{false};
   MonotonicTime due{};  ///< When it wants to be back.
   double depth_age_s{};
+  /// The camera, or kMostCameras + the LiDAR, whose images are the oldest usable ones, and what was wrong with the newest; kNone:
+  /// there was none.
+  std::uint8_t depth_sensor{};
+  stages::FrameFault depth_fault{};
   int failures{};      ///< Decisions in a row without a usable answer.
   int map_refusals{};  ///< Decisions in a row in which the map refused bricks.
   bool site_known{false};

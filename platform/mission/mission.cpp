@@ -65,6 +65,14 @@ report::KnownSlice known_slice(const stages::MapView& view, const Aabb& bounds_W
   return slice;
 }
 
+/// "camera 1: covered".
+std::string sensor_of(const flight::FailsafeEvent& e) {
+  const bool is_camera = e.depth_sensor < kMostCameras;
+  return fmt::format("{} {}: {}", is_camera ? "camera" : "lidar",
+                     e.depth_sensor - (is_camera ? 0 : kMostCameras) + 1,
+                     e.depth_fault == stages::FrameFault::kNone ? "silent" : to_string(e.depth_fault));
+}
+
 constexpr const char* kCustom = "custom";  // what the caller brought, in reports
 
 double quantile(std::vector<double> values, double q) {
@@ -315,14 +323,19 @@ void MissionRun::summarise(double wall_s) {
 void MissionRun::record_failsafe() {
   report_.safety = judge_.safety();
   report_.safety.end_W = aircraft_.vehicle().state().p_WB;
+  report_.safety.goal_error_m = (report_.safety.end_W - world_.goal_W()).norm();
   report_.safety.landing_site_was_known = system_.pilot().site_was_known();
   for (const flight::FailsafeEvent& e : system_.pilot().events()) {
-    report::FailsafeRecord record{
-        seconds(e.time.time_since_epoch()), governor::to_string(e.action), governor::to_string(e.phase), {}};
+    report::FailsafeRecord record{seconds(e.time.time_since_epoch()),
+                                  governor::to_string(e.action),
+                                  governor::to_string(e.phase),
+                                  {},
+                                  {}};
     for (const governor::FailsafeRow& row : governor::kFailsafeTable) {
       if ((e.conditions & governor::bit(row.condition)) != 0)
         record.conditions.emplace_back(governor::to_string(row.condition));
     }
+    if ((e.conditions & governor::bit(governor::Condition::kDepth)) != 0) record.sensor = sensor_of(e);
     report_.safety.actions.push_back(std::move(record));
   }
 }

@@ -181,7 +181,7 @@ void ScenarioReader::read_expectation(Scenario& s) const {
   const toml::table& t = table("expect");
   reader_.allow_keys(t, "[expect]",
                      {"outcome", "action", "condition", "within_s", "motors_stop_within_s", "touchdown_mps",
-                      "home_within_m", "goal_within_m", "landing_site_known"});
+                      "home_within_m", "goal_within_m", "landing_site_known", "sensor"});
   s.expect.outcome = kOutcomes[choice(reader_.need(t, "outcome", "[expect]"), "outcome", kOutcomes)];
   if (const toml::node* node = t.get("action"))
     s.expect.action = governor::to_string(static_cast<governor::Action>(
@@ -189,6 +189,7 @@ void ScenarioReader::read_expectation(Scenario& s) const {
   if (const toml::node* node = t.get("condition"))
     s.expect.condition = governor::to_string(static_cast<governor::Condition>(
         choice(*node, "condition", names_of<governor::Condition, governor::kConditionCount>())));
+  if (const toml::node* node = t.get("sensor")) s.expect.sensor = text(*node, "sensor");
   s.expect.within_s = maybe(t, "within_s", 7200);
   s.expect.motors_stop_within_s = maybe(t, "motors_stop_within_s", 7200);
   for (const char* key : {"within_s", "motors_stop_within_s"}) {
@@ -252,6 +253,9 @@ std::vector<std::string> complaints_of(const Scenario& s, const report::MissionR
   };
   if (e.condition && std::none_of(safety.actions.begin(), safety.actions.end(), saw))
     complain(fmt::format("no action was decided while {} held", *e.condition));
+  if (e.sensor && std::none_of(safety.actions.begin(), safety.actions.end(),
+                               [&e](const auto& r) { return r.sensor == *e.sensor; }))
+    complain(fmt::format("no action was decided because of \"{}\"", *e.sensor));
   const bool faulted = safety.first_fault_s >= 0.0;
   if (!s.config.faults.empty() && !faulted) complain("its phase never came: no fault was injected");
   if (e.within_s && faulted) {

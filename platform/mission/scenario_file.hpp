@@ -19,6 +19,7 @@ struct Expectation {
   std::optional<double> within_s;              ///< From the first fault to the first action.
   std::optional<double> motors_stop_within_s;  ///< From the first fault to the last thrust.
   std::optional<double> touchdown_mps;         ///< At most.
+  std::optional<std::string> sensor;           ///< FailsafeRecord::sensor of one of its actions.
   std::optional<double> home_within_m;         ///< Where it ends, over ground.
   std::optional<bool> landing_site_known;
 };

@@ -123,6 +123,7 @@ struct FailsafeRecord {
   std::string action;
   std::string phase;                    ///< In which it was decided.
   std::vector<std::string> conditions;  ///< That held then.
+  std::string sensor;  ///< Of the condition depth: which one is worst off, and why. Or empty.
 };
 
 /// What a flight with faults is judged by; all of it is the world's truth, not the vehicle's belief.
@@ -134,6 +135,7 @@ struct SafetyRecord {
   bool left_fence{};
   bool landing_site_was_known{};
   Vector3 end_W = Vector3::Zero();
+  double goal_error_m{};  ///< From there to the goal.
 };
 
 /// What the vehicle's map knew at one height when the mission ended, from above.

@@ -30,9 +30,9 @@ double seconds_between(MonotonicTime from, MonotonicTime to) noexcept {
   return seconds(to.time_since_epoch()) - seconds(from.time_since_epoch());
 }
 
-/// See kLeastInformedRatio.
-bool is_informed(const PosedDepthFrame& posed) noexcept {
-  if (posed.is_cloud) return true;
+/// Of the pixels that look down; 1 if none does, and of a cloud. See kLeastInformedRatio.
+double informed_ratio(const PosedDepthFrame& posed) noexcept {
+  if (posed.is_cloud) return 1.0;
   constexpr std::size_t kSide = 16;
   const firmware_if::DepthFrame& f = posed.frame;
   std::size_t down = 0, informed = 0;
@@ -50,7 +50,7 @@ bool is_informed(const PosedDepthFrame& posed) noexcept {
       informed += f.depth_m[v * f.width + u] > f.range_min_m ? 1U : 0U;
     }
   }
-  return static_cast<double>(informed) >= kLeastInformedRatio * static_cast<double>(down);
+  return down == 0 ? 1.0 : static_cast<double>(informed) / static_cast<double>(down);
 }
 
 }  // namespace
@@ -73,7 +73,7 @@ Status check_frame(const PosedDepthFrame& posed) noexcept {
   const auto& depth_m = posed.frame.depth_m;
   const bool any =
       std::any_of(depth_m.begin(), depth_m.end(), [&](float d) { return d > posed.frame.range_min_m; });
-  return any && is_informed(posed) ? Status::kOk : Status::kInvalidArgument;
+  return any && informed_ratio(posed) >= kLeastInformedRatio ? Status::kOk : Status::kInvalidArgument;
 }
 
 void FrameGuard::begin(std::span<const PosedDepthFrame> scan) noexcept {
@@ -103,16 +103,27 @@ bool FrameGuard::frozen(const firmware_if::DepthFrame& frame) noexcept {
   return false;
 }
 
+FrameFault FrameGuard::judge(const PosedDepthFrame& posed) noexcept {
+  return check_shape(posed) == Status::kOk ? judge_content(posed) : FrameFault::kShape;
+}
+
 Status FrameGuard::check(const PosedDepthFrame& posed) noexcept {
-  return check_shape(posed) == Status::kOk ? check_content(posed) : Status::kInvalidArgument;
+  return judge(posed) == FrameFault::kNone ? Status::kOk : Status::kInvalidArgument;
 }
 
 Status FrameGuard::check_content(const PosedDepthFrame& posed) noexcept {
+  return judge_content(posed) == FrameFault::kNone ? Status::kOk : Status::kInvalidArgument;
+}
+
+FrameFault FrameGuard::judge_content(const PosedDepthFrame& posed) noexcept {
   const double late_s = seconds_between(scan_, posed.frame.stamp);
   const bool in_time = !scan_too_old_ && std::fabs(late_s) <= seconds(kStampSpread);
   const bool has_noise = posed.error.constant_m > 0.0 || posed.error.quadratic_per_m > 0.0;
-  if (!in_time || !is_informed(posed) || (has_noise && frozen(posed.frame))) return Status::kInvalidArgument;
-  return Status::kOk;
+  if (!in_time) return FrameFault::kStamp;
+  const double informed = informed_ratio(posed);
+  if (informed < kLeastInformedRatio)
+    return informed < kCoveredRatio ? FrameFault::kCovered : FrameFault::kFog;
+  return has_noise && frozen(posed.frame) ? FrameFault::kFrozen : FrameFault::kNone;
 }
 
 }  // namespace roborun::stages

@@ -15,6 +15,8 @@ namespace roborun::stages {
 /// of stereo's may have none. Sky without values is ordinary, and so is a sensor of which no pixel looks down.
 inline constexpr double kLeastInformedRatio = 0.25;
 inline constexpr double kDownwards = 0.26;
+/// Of the same pixels: with less the lens is covered.
+inline constexpr double kCoveredRatio = 0.05;
 
 /// kOk if a frame can be read: 8..1280 pixels a side, as many depths as pixels, range in (0, kMaxRange_m], least
 /// range in [0, range), both tangents of the field of view in (0, kMaxTanHalfFov], finite pose. Otherwise kInvalidArgument. RT-safe: O(1).
@@ -22,6 +24,21 @@ inline constexpr double kDownwards = 0.26;
 /// kOk if a frame may be used at all: check_shape(), a pixel with information, and enough of those that look down (of a
 /// cloud: none). Otherwise kInvalidArgument: black, NaN, the lower half missing, wrong size. RT-safe: O(pixels).
 [[nodiscard]] Status check_frame(const PosedDepthFrame& posed) noexcept;
+
+/// Why an image is not believed.
+enum class FrameFault : std::uint8_t {
+  kNone,
+  kShape,    ///< check_shape().
+  kStamp,    ///< Of another time than the others of its scan.
+  kCovered,  ///< Hardly any information where ground or floor must be: a lens that is covered or blinded, darkness, nonsense.
+  kFog,  ///< Too little of it (kLeastInformedRatio), but more than kCoveredRatio: fog, dust, a lens that is half covered.
+  kFrozen,  ///< The same as before, with another stamp.
+  kTurned,  ///< It disagrees with the map all over: not this guard's judgement, but that of who knows the map.
+};
+[[nodiscard]] constexpr const char* to_string(FrameFault fault) noexcept {
+  constexpr std::array<const char*, 7> kName{"none", "shape", "stamp", "covered", "fog", "frozen", "turned"};
+  return kName[static_cast<std::size_t>(fault)];
+}
 
 /// check_frame(), and what only the frames before can tell:
 ///  - stamps: a frame more than kStampSpread from the middle one of its scan, or a scan that much older than
@@ -37,8 +54,9 @@ class FrameGuard {
 
   /// To be called once a scan, before check(). RT-safe: O(frames).
   void begin(std::span<const PosedDepthFrame> scan) noexcept;
-  /// kOk or kInvalidArgument. The same frame again is no frozen one, and an image of nothing but sky may be empty. RT-safe:
+  /// What is wrong with it; check(): kOk if nothing is, or else kInvalidArgument. The same frame again is no frozen one, and an image of nothing but sky may be empty. RT-safe:
   /// O(1).
+  [[nodiscard]] FrameFault judge(const PosedDepthFrame& posed) noexcept;
   [[nodiscard]] Status check(const PosedDepthFrame& posed) noexcept;
   /// The same for who knows that check_shape() is kOk.
   [[nodiscard]] Status check_content(const PosedDepthFrame& posed) noexcept;
@@ -48,6 +66,7 @@ class FrameGuard {
     std::uint64_t hash{};  ///< 0: none.
     MonotonicTime stamp{};
   };
+  [[nodiscard]] FrameFault judge_content(const PosedDepthFrame& posed) noexcept;
   [[nodiscard]] bool frozen(const firmware_if::DepthFrame& frame) noexcept;
 
   std::array<Print, 32> print_{};

@@ -41,6 +41,10 @@ enum class FaultKind : std::uint8_t {
   kOn,            ///< Kill switch: pressed. Wind: a storm.
   kJump,          ///< 2 m to the north, without a word.
   kReset,         ///< Begins anew, elsewhere and turned, and says so.
+  kCovered,       ///< A lens under mud or a leaf: no pixel has a value but for some that seem near.
+  kTurned,        ///< A camera that a bump turned by 12 degrees to the left and 10 down.
+  kFog,           ///< Fog of 10 m visibility that comes up: the farther, the fewer values.
+  kRain,          ///< Drops: one pixel in 300, alone and near; wet lenses: patches without a value.
 };
 
 /// One row: which kinds make sense for a component, and of how many instances.
@@ -59,14 +63,15 @@ inline constexpr std::array<ComponentSpec, kComponentCount> kComponents = [] {
   constexpr std::uint16_t off = bit(FaultKind::kOff), stuck = bit(FaultKind::kStuck), garbage = bit(FaultKind::kGarbage),
       wrong = bit(FaultKind::kWrong), slow = bit(FaultKind::kSlow), delayed = bit(FaultKind::kDelayed),
       some = bit(FaultKind::kIntermittent), on = bit(FaultKind::kOn), jump = bit(FaultKind::kJump),
-      reset = bit(FaultKind::kReset);
+      reset = bit(FaultKind::kReset), covered = bit(FaultKind::kCovered), turned = bit(FaultKind::kTurned),
+      fog = bit(FaultKind::kFog), rain = bit(FaultKind::kRain);
   constexpr std::uint16_t sensor = off | stuck | garbage | wrong | slow | delayed | some;
   return std::array<ComponentSpec, kComponentCount>{{
     {C::kImu, "imu", 1, sensor},
     {C::kGnss, "gnss", 1, sensor | jump},                              // wrong: 30 m to the north
     {C::kOdometry, "odometry", 1, off | stuck | garbage | slow | delayed | some | jump | reset},
     {C::kBarometer, "barometer", 1, sensor},                           // wrong: 30 m too high
-    {C::kDepth, "depth", 6, sensor},                                   // wrong: half the distance
+    {C::kDepth, "depth", 6, sensor | covered | turned | fog | rain},   // wrong: half the distance
     {C::kBattery, "battery", 1, off | stuck | garbage | wrong},        // wrong: 5 % left
     {C::kEsc, "esc", 4, off | stuck | garbage | wrong | slow | some},  // wrong: 85 % of the thrust
     {C::kEscStatus, "esc_status", 4, off},
@@ -81,8 +86,9 @@ inline constexpr std::array<ComponentSpec, kComponentCount> kComponents = [] {
   }};
 }();
 // clang-format on
-inline constexpr std::array<const char*, 11> kFaultKindNames{
-    "none", "off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent", "on", "jump", "reset"};
+inline constexpr std::array<const char*, 15> kFaultKindNames{
+    "none", "off",  "stuck", "garbage", "wrong",  "slow", "delayed", "intermittent",
+    "on",   "jump", "reset", "covered", "turned", "fog",  "rain"};
 
 struct Fault {
   Component component{};

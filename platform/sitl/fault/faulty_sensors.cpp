@@ -1,6 +1,10 @@
 #include "platform/sitl/fault/faulty_sensors.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
+
+#include "core/geometry/math.hpp"
 
 namespace roborun::sitl {
 namespace {
@@ -64,6 +68,70 @@ void begin_anew(firmware_if::OdometrySample& s) noexcept {
   s.p_OB_m = {7.0 - s.p_OB_m[1], s.p_OB_m[0] - 3.0, s.p_OB_m[2] + 1.0};
   s.v_OB_mps = {-s.v_OB_mps[1], s.v_OB_mps[0], s.v_OB_mps[2]};
   s.q_OB = {kHalf * (w - z), kHalf * (x - y), kHalf * (x + y), kHalf * (w + z)};
+}
+
+constexpr float kNoValue = std::numeric_limits<float>::quiet_NaN();
+
+void cover(std::uint64_t number, const firmware_if::DepthFrame& frame, std::vector<float>& depth_m) noexcept {
+  core::CounterRng rng(number, 41);
+  for (float& d : depth_m)
+    d = rng.below(50) == 0 ? frame.range_min_m + static_cast<float>(rng.uniform(0.05, 0.5)) : kNoValue;
+}
+
+/// What the camera would see: the nearest pixels of what it saw, along its new axis; nothing where it did not look before.
+void turn(const firmware_if::DepthFrame& frame, std::vector<float>& depth_m) noexcept {
+  constexpr double kLeft_rad = 12.0 * core::kDegree, kDown_rad = 10.0 * core::kDegree;
+  const core::SinCos left = core::sin_cos(kLeft_rad), down = core::sin_cos(kDown_rad);
+  Matrix3 yaw, pitch;
+  yaw << left.cos, -left.sin, 0.0, left.sin, left.cos, 0.0, 0.0, 0.0, 1.0;
+  pitch << down.cos, 0.0, down.sin, 0.0, 1.0, 0.0, -down.sin, 0.0, down.cos;
+  const Matrix3 R = yaw * pitch;
+  const auto across = static_cast<double>(frame.tan_half_width),
+             along = static_cast<double>(frame.tan_half_height);
+  for (std::size_t v = 0; v < frame.height; ++v) {
+    for (std::size_t u = 0; u < frame.width; ++u) {
+      const Vector3 ray =
+          R * Vector3(1.0, across * (1.0 - (2.0 * static_cast<double>(u) + 1.0) / frame.width),
+                      along * (1.0 - (2.0 * static_cast<double>(v) + 1.0) / frame.height));
+      float& to = depth_m[v * frame.width + u];
+      to = kNoValue;
+      if (!(ray.x() > 0.0)) continue;
+      const double column = 0.5 * frame.width * (1.0 - ray.y() / (ray.x() * across));
+      const double row = 0.5 * frame.height * (1.0 - ray.z() / (ray.x() * along));
+      if (!(column >= 0.0 && column < frame.width && row >= 0.0 && row < frame.height)) continue;
+      const float from =
+          frame.depth_m[static_cast<std::size_t>(row) * frame.width + static_cast<std::size_t>(column)];
+      // Depths count along the axis; nothing within the range stays nothing.
+      to = from < frame.range_m ? static_cast<float>(static_cast<double>(from) / ray.x()) : from;
+    }
+  }
+}
+
+/// Contrast falls by 95 % over the visibility (Koschmieder): so does the share of pixels that a stereo camera can match.
+void veil(std::uint64_t number, const firmware_if::DepthFrame& frame, std::vector<float>& depth_m) noexcept {
+  constexpr double kVisibility_m = 10.0;
+  core::CounterRng rng(number, 42);
+  for (float& d : depth_m) {
+    const auto z_m = static_cast<double>(std::fmin(d, frame.range_m));
+    if (!(rng.uniform() < core::exp(-3.0 * z_m / kVisibility_m))) d = kNoValue;
+  }
+}
+
+void wet(std::uint64_t number, const firmware_if::DepthFrame& frame, std::vector<float>& depth_m) noexcept {
+  core::CounterRng rng(number, 43);
+  constexpr std::size_t kDropsOnLens = 6;
+  for (float& d : depth_m)
+    if (rng.below(300) == 0) d = frame.range_min_m + static_cast<float>(rng.uniform(0.2, 3.0));
+  // Those on the lens stay where they are for all of the flight.
+  core::CounterRng lens(number % 8, 44);
+  const std::size_t radius = frame.width / 12U;
+  for (std::size_t k = 0; k < kDropsOnLens; ++k) {
+    const std::size_t u0 = lens.below(frame.width), v0 = lens.below(frame.height);
+    for (std::size_t v = v0 - std::min(v0, radius); v < std::min<std::size_t>(v0 + radius, frame.height); ++v)
+      for (std::size_t u = u0 - std::min(u0, radius); u < std::min<std::size_t>(u0 + radius, frame.width);
+           ++u)
+        depth_m[v * frame.width + u] = kNoValue;
+  }
 }
 
 template <typename Sample>
@@ -168,6 +236,18 @@ Status FaultyDepthCamera::read(firmware_if::DepthFrame& frame) noexcept {
       break;
     case FaultKind::kWrong:
       for (float& depth_m : bent_m_) depth_m *= 0.5F;
+      break;
+    case FaultKind::kCovered:
+      cover(number, frame, bent_m_);
+      break;
+    case FaultKind::kTurned:
+      turn(frame, bent_m_);
+      break;
+    case FaultKind::kFog:
+      veil(number, frame, bent_m_);
+      break;
+    case FaultKind::kRain:
+      wet(number, frame, bent_m_);
       break;
     case FaultKind::kSlow:
       return frame.sequence % kSlow == 0 ? Status::kOk : Status::kNotReady;

@@ -50,7 +50,8 @@ TEST(Settings, ModelsGoForAllSensorsOfAKind) {
   load_settings(
       test::scratch_file("models.toml",
                          "[camera]\nmodel = \"d455\"\ninvalid_ratio = 0.3\n[lidar]\nmodel = \"ring\"\n"
-                         "[imu]\nmodel = \"mems\"\n[gnss]\nmodel = \"m9n\"\n[rain]\nrate_mmph = 5\n"),
+                         "[imu]\nmodel = \"mems\"\n[gnss]\nmodel = \"m9n\"\n[odometry]\nmodel = \"vio\"\n"
+                         "[rain]\nrate_mmph = 5\n"),
       config);
   for (const CameraSpec& camera : rig.cameras) {
     EXPECT_EQ(camera.model, CameraModel::kD455);
@@ -59,6 +60,7 @@ TEST(Settings, ModelsGoForAllSensorsOfAKind) {
   EXPECT_EQ(rig.lidars[0].model, LidarModel::kRing);
   EXPECT_EQ(config.simulator.sensors.imu, ImuModel::kMems);
   EXPECT_EQ(config.simulator.sensors.gnss, GnssModel::kM9n);
+  EXPECT_EQ(config.simulator.sensors.odometry, OdometryModel::kVio);
   EXPECT_EQ(config.simulator.lidar.rain_mmph, 5.0);
 }
 
@@ -66,6 +68,8 @@ TEST(Settings, RefusesModelsAndNumbersThatNoSensorHas) {
   const std::pair<const char*, const char*> cases[] = {
       {"[camera]\nmodel = \"d4\"\n", ":2: model: must be one of \"clean\", \"d435\""},
       {"[gnss]\nmodel = 3\n", ":2: model: must be one of \"clean\", \"m9n\""},
+      {"[odometry]\nmodel = \"t265\"\n", ":2: model: must be one of \"none\", \"vio\""},
+      {"[gnss]\nmodel = \"none\"\n", ":1: model: must not be \"none\" without [odometry]"},
       {"[lidar]\nmodel = \"ring\"\n", ":1: lidar: must not be there: the vehicle has none"},
       {"[camera]\ninvalid_ratio = 0.2\n", ":2: invalid_ratio: must not be there without a camera of a model"},
       {"[camera]\nmodel = \"tof\"\nnoise_m = 0.2\n", ":3: noise_m: must not be there"},

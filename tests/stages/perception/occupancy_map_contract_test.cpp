@@ -186,6 +186,20 @@ TEST_P(OccupancyMapContract, EndsWhenTheBudgetIsSpentAndKeepsWhatItHas) {
   EXPECT_LT(units, result_.work.units);
 }
 
+TEST_P(OccupancyMapContract, AnswersAsANewOneAfterForgetting) {
+  const std::uint64_t empty = sut_->digest();
+  ASSERT_EQ(see(scene_.look(at_)), Status::kOk);
+  const std::uint64_t first = sut_->digest();
+  ASSERT_EQ(at(Vector3(4, 0, 5)), CellState::kFree);
+  sut_->forget();
+  EXPECT_EQ(sut_->digest(), empty);
+  EXPECT_EQ(sut_->known_volume_m3(), 0.0);
+  EXPECT_EQ(at(Vector3(4, 0, 5)), CellState::kUnknown) << "without an export";
+  ASSERT_EQ(see(scene_.look(at_)), Status::kOk);
+  EXPECT_EQ(sut_->digest(), first);
+  EXPECT_EQ(at(Vector3(4, 0, 5)), CellState::kFree);
+}
+
 TEST_P(OccupancyMapContract, SaysHowMuchMemoryItTakes) {
   const std::size_t empty = sut_->bytes();
   ASSERT_EQ(see(scene_.look(at_)), Status::kOk);

@@ -14,13 +14,16 @@ namespace {
 constexpr Nanos kFrame{2'500'000};
 
 struct Bench {
-  FaultLine line;
-  FaultySensors sensors{NavigationSensors({}, 7)};
-  NavigationSensors twin{{}, 7};
-  VehicleState state;
+  NavigationSensorsConfig config{};
+  FaultLine line{};
+  FaultySensors sensors{NavigationSensors(config, 7)};
+  NavigationSensors twin{config, 7};
+  VehicleState state{};
   MonotonicTime now{};
 
-  Bench() { sensors.connect(&line); }
+  explicit Bench(const NavigationSensorsConfig& sensors_config = {}) : config(sensors_config) {
+    sensors.connect(&line);
+  }
   void frame() {
     now += kFrame;
     line.advance(now);
@@ -54,6 +57,36 @@ TEST(FaultySensors, PassEverythingAsItIsWithoutAFault) {
     EXPECT_EQ(got[i].p_WB_m, wanted[i].p_WB_m);
     EXPECT_EQ(got[i].stamp, wanted[i].stamp);
   }
+}
+
+TEST(FaultySensors, OdometryBeginsAnewElsewhereAndTurnedAndSaysSo) {
+  Bench bench{NavigationSensorsConfig{.odometry = OdometryModel::kVio}};
+  (void)bench.second<firmware_if::OdometrySample>();
+  bench.line.inject({Component::kOdometry, FaultKind::kReset}, Nanos{std::chrono::seconds{2}});
+  const auto [got, wanted] = bench.second<firmware_if::OdometrySample>();
+  ASSERT_EQ(got.size(), wanted.size());
+  ASSERT_GT(got.size(), 5U);
+  const auto rotation = [](const firmware_if::OdometrySample& s) {
+    return Quaternion(s.q_OB[0], s.q_OB[1], s.q_OB[2], s.q_OB[3]);
+  };
+  // From the old frame to the new one: one turn about the vertical for pose and velocity alike.
+  const Quaternion turn = rotation(got[0]) * rotation(wanted[0]).conjugate();
+  EXPECT_NEAR(turn.norm(), 1.0, 1e-9);
+  EXPECT_NEAR(turn.z() * turn.z() + turn.w() * turn.w(), 1.0, 1e-9);
+  EXPECT_NEAR(2.0 * turn.z() * turn.w(), 1.0, 1e-9) << "a quarter to the left";
+  const Vector3 before(wanted[3].p_OB_m[0] - wanted[0].p_OB_m[0], wanted[3].p_OB_m[1] - wanted[0].p_OB_m[1],
+                       0.0);
+  const Vector3 after(got[3].p_OB_m[0] - got[0].p_OB_m[0], got[3].p_OB_m[1] - got[0].p_OB_m[1], 0.0);
+  EXPECT_LT((turn.toRotationMatrix() * before - after).norm(), 1e-9);
+  EXPECT_EQ(got[0].reset_counter, wanted[0].reset_counter + 1);
+}
+
+TEST(FaultySensors, AJumpIsTwoMetresToTheNorth) {
+  Bench bench;
+  bench.line.inject({Component::kGnss, FaultKind::kJump}, Nanos{std::chrono::seconds{2}});
+  const auto [got, wanted] = bench.second<firmware_if::GnssFix>();
+  ASSERT_EQ(got.size(), wanted.size());
+  EXPECT_DOUBLE_EQ(got[0].p_WB_m[1], wanted[0].p_WB_m[1] + 2.0);
 }
 
 TEST(FaultySensors, EveryKindDoesWhatItsNameSays) {

@@ -1,0 +1,24 @@
+/// Compares what cameras see with what the map knows, before the map gets it: a camera that was turned by a bump puts everything
+/// where it is not.
+#pragma once
+
+#include <cstdint>
+
+#include "stages/perception/map_view.hpp"
+#include "stages/perception/occupancy_map.hpp"
+
+namespace roborun::flight {
+
+enum class Agreement : std::uint8_t {
+  kUnknown,  ///< Too few surfaces nearby, or in space of which nothing is known.
+  kAgrees,
+  kDisagrees,  ///< In every part of the image that shows surfaces, many lie where the map knows free space.
+};
+
+/// 256 pixels in four parts of the image, those that show a surface within 10 m: it contradicts the map if all within 0.6 m
+/// of it, and three sigma of its depth, is known to be free. What moves fills a part of the image, a turned camera errs in all of
+/// them: at least three, and a quarter of the image in all; an eighth of each part's surfaces, and a third of all. Precondition: check_shape(posed) is kOk. RT-safe: O(1).
+[[nodiscard]] Agreement agreement_of(const stages::PosedDepthFrame& posed,
+                                     const stages::MapView& known) noexcept;
+
+}  // namespace roborun::flight
