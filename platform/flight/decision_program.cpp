@@ -18,10 +18,6 @@ constexpr Nanos kIdlePeriod{100'000'000};  // of reports while there is nothing 
 constexpr double kHover_mps = 0.3;
 constexpr Nanos kLatestStop{20'000'000};  // 12 cm at 6 m/s
 
-bool looks_down(const stages::PosedDepthFrame& posed) noexcept {
-  return posed.X_WC.R_RT(2, 0) < -0.7;  // of its optical axis
-}
-
 }  // namespace
 
 DecisionProgram::DecisionProgram(const Config& config, DecisionPipeline& pipeline,
@@ -110,8 +106,9 @@ void DecisionProgram::look(const stages::PastStates& past, bool airborne, Monoto
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     const std::size_t sensor = sensor_of_[i];
     const bool usable = guard_.check(frames_[i]) == Status::kOk;
-    // From the ground, a camera that looks down sees nothing: all of it is nearer than its least range.
-    const bool may_be_dark = !airborne && frames_[i].frame.range_min_m > 0.0F && looks_down(frames_[i]);
+    // On the ground and close to it a camera may see nothing: all of it is nearer than its least range, which a product has
+    // whatever the frame says.
+    const bool may_be_dark = !airborne && (frames_[i].frame.range_min_m > 0.0F || frames_[i].error.dark_sky);
     if (usable || may_be_dark) last_usable_[sensor] = frames_[i].frame.stamp;
     if (!usable) continue;
     ++scan[sensor < kMostCameras ? 0 : 1 + sensor - kMostCameras];

@@ -51,6 +51,7 @@ std::size_t BrickMap::arena_bytes(const Config& config) noexcept {
   return positions * (2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
          config.max_bricks * (sizeof(Brick) + 2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
          config.max_frames * DepthPyramid::arena_bytes(config.max_image_width, config.max_image_height) +
+         config.max_image_width * config.max_image_height * sizeof(float) +
          16 * alignof(std::max_align_t);
 }
 
@@ -77,6 +78,8 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
   dirty_pool_ = &arena.last_pool();
   known_count_ = arena.take<std::uint16_t>(config.max_bricks, "map known counts");
   known_pool_ = &arena.last_pool();
+  filled_ = arena.take<float>(config.max_image_width * config.max_image_height, "map filled image");
+  arena.last_pool().use(filled_.size());
   std::fill(slot_.begin(), slot_.end(), kUnknownBrick);
   free_brick_.fill(evidence::kFree);
   surface_brick_.fill(evidence::kUnknown);
