@@ -79,11 +79,14 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core
       for (int u = 0; u < frame.width; ++u) {
         const float raw_m =
             frame.depth_m[static_cast<std::size_t>(v) * frame.width + static_cast<std::size_t>(u)];
-        if (!(raw_m > frame.range_min_m)) continue;
+        const bool is_value = raw_m > frame.range_min_m;
+        // A hole may be sky: what the map makes of it is its own matter, but it must be allowed to.
+        if (!is_value && !posed.error.dark_sky) continue;
         const double y = across - (u + 0.5) * 2.0 * across / frame.width;
         const Vector3 direction_W = posed.X_WC.R_RT * Vector3(1.0, y, z);
-        double depth_m = std::fmin(static_cast<double>(raw_m), static_cast<double>(frame.range_m));
-        if (raw_m < frame.range_m && !add(posed.X_WC.p_RT + depth_m * direction_W, cell_m)) full = true;
+        const auto range_m = static_cast<double>(frame.range_m);
+        double depth_m = is_value ? std::fmin(static_cast<double>(raw_m), range_m) : range_m;
+        if (is_value && raw_m < frame.range_m && !add(posed.X_WC.p_RT + depth_m * direction_W, cell_m)) full = true;
         const double height_m = posed.X_WC.p_RT.z();
         if (direction_W.z() > 0.0)
           depth_m = std::fmin(depth_m, std::fmax(high_m_ - height_m, 0.0) / direction_W.z());
