@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "core/geometry/vector.hpp"
+#include "core/precision.hpp"
 #include "core/stopping_model.hpp"
 
 namespace roborun {
@@ -43,6 +44,7 @@ struct VehicleModel {
   double climb_mps{6.0};
   double descent_mps{6.0};
   double yaw_rate_radps{1.5};
+  double finest_cell_m{kPublishedCell_m};
   double thinnest_m{0.02};  ///< A washing line, a bare cable.
 
   /// Measured, of a vehicle that has been flown; none: derived from the limits.
@@ -64,9 +66,9 @@ struct VehicleKey {
 };
 
 // clang-format off
-inline constexpr std::array<VehicleKey, 25> kVehicleKeys = [] {
+inline constexpr std::array<VehicleKey, 26> kVehicleKeys = [] {
   using V = VehicleModel;
-  return std::array<VehicleKey, 25>{{
+  return std::array<VehicleKey, 26>{{
     {"body", "radius_m", &V::radius_m, 0.05, 2.0, "of the sphere around everything that must not touch, propellers included"},
     {"body", "tracking_error_m", &V::tracking_error_m, 0.02, 2.0, "largest distance from the reference in flight: added to the radius for planning"},
     {"body", "mass_kg", &V::mass_kg, 0.05, 100.0, "at take-off, load included"},
@@ -91,6 +93,7 @@ inline constexpr std::array<VehicleKey, 25> kVehicleKeys = [] {
     {"limits", "climb_mps", &V::climb_mps, 0.2, 30.0, "fastest climb"},
     {"limits", "descent_mps", &V::descent_mps, 0.2, 30.0, "fastest descent"},
     {"limits", "yaw_rate_radps", &V::yaw_rate_radps, 0.05, 10.0, "fastest turn about the vertical"},
+    {"limits", "finest_cell_m", &V::finest_cell_m, 0.05, 0.3, "edge of the map's finest cells, for the design aware: smaller ones let it through narrower gaps, and cost more", true},
     {"limits", "thinnest_m", &V::thinnest_m, 0.005, 1.0, "the thinnest pole or wire that it must not fly into", true},
   }};
 }();

@@ -40,7 +40,7 @@ LatencyModel fit_latency(std::span<const LatencyPoint> points) noexcept {
   using Normal = Eigen::Matrix<double, kTerms, kTerms>;
   // Term 4 + k is a constant of levels 0 .. k: steps >= 0 make the constants fall with the level.
   const auto terms_of = [](int level, double volume_m3) -> Terms {
-    const double r = 1.0 / cell_size_m(level);
+    const double r = 1.0 / PrecisionLattice{}.cell_size_m(level);
     Terms row = Terms::Zero();
     row.head<kVolumeTerms>() << r * r * r * volume_m3, r * r * volume_m3, r * volume_m3, volume_m3;
     for (int k = level; k < kPrecisionLevels; ++k) row[kVolumeTerms + k] = 1.0;

@@ -27,7 +27,7 @@ struct Eq4 {
   std::array<double, 4> q{};
 };
 /// On the lattice finest_m * 2^level.
-[[nodiscard]] LatencyModel from_eq4(const Eq4& eq4, double finest_m = kFinestCell_m) noexcept;
+[[nodiscard]] LatencyModel from_eq4(const Eq4& eq4, double finest_m = kPublishedCell_m) noexcept;
 /// The part of a cost profile that depends on level and volume.
 [[nodiscard]] LatencyModel from_cost(const core::StageCost& cost) noexcept;
 

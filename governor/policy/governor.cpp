@@ -91,7 +91,8 @@ Status GovernorConfig::validate() const noexcept {
   for (const double fixed_s : {point_cloud_s, governor_s, smoother_s})
     ok = ok && core::within(fixed_s, 0.0, 1e6);
   ok = ok && core::above(v_max_mps, 0.0, 30.0) && core::above(vehicle_width_m, 0.0, 20.0) &&
-       core::above(sensor_volume_max_m3, 0.0, 1e9) && core::within(coarsest_level, 0, kPrecisionLevels - 1) &&
+       core::above(sensor_volume_max_m3, 0.0, 1e9) && core::within(lattice.finest_m, 0.05, 0.3) &&
+       core::within(coarsest_level, 0, kPrecisionLevels - 1) &&
        core::above(design_visibility_m, 0.0, 1000.0) && minor_frame > Nanos{0};
   return ok ? Status::kOk : Status::kInvalidArgument;
 }
@@ -202,10 +203,11 @@ int Governor::asked_level(const Task& task, Decision& d) const noexcept {
   const Policy& policy = config_.policy;
   const double gap_cell_m = 0.25 * (task.profile.gap_average_m - config_.vehicle_width_m);
   d.demand_m = std::fmin(gap_cell_m, task.profile.closest_obstacle_m / policy.cells_to_obstacle);
-  int level = std::min(coarsest_level_within(d.demand_m), config_.coarsest_level);
+  int level = std::min(config_.lattice.coarsest_level_within(d.demand_m), config_.coarsest_level);
   level = std::min(level, last_level_ + policy.coarser_levels_per_decision);
   level = std::max(level - finer_levels(task.situation), 0);
-  if (near_goal(task.situation) || task.situation.surveying) level = std::min(level, 1);
+  if (near_goal(task.situation) || task.situation.surveying)
+    level = std::min(level, config_.lattice.coarsest_level_within(2.0 * kPublishedCell_m));
   return level;
 }
 
@@ -262,15 +264,16 @@ SolverProblem Governor::problem_of(const Task& task, const Precision& precision,
                                    double plan_m3) const noexcept {
   const SpaceProfile& profile = task.profile;
   SolverProblem p;
+  p.p_min_m = config_.lattice.finest_m;
   p.delta_d_s = deadline_s * (1.0 - config_.policy.reserve_ratio) - task.overhead_s;
   p.model = config_.model;
   for (const Knob knob : kKnobs) {
     for (double& s : p.model[knob].fixed_s) s *= scale(stage_of(knob));
     for (double& s : p.model[knob].slope_s_per_m3) s *= scale(stage_of(knob));
   }
-  p.g_min_m = cell_size_m(precision.finest);
-  p.g_avg_m = cell_size_m(precision.coarsest);
-  p.d_obs_m = std::fmax(profile.closest_obstacle_m, cell_size_m(precision.coarsest));
+  p.g_min_m = config_.lattice.cell_size_m(precision.finest);
+  p.g_avg_m = config_.lattice.cell_size_m(precision.coarsest);
+  p.d_obs_m = std::fmax(profile.closest_obstacle_m, config_.lattice.cell_size_m(precision.coarsest));
   p.p1_coarsest_level = precision.coarsest;
   // A way back leads through what no camera sees now: the planner gets so much of what the map holds all the same.
   p.v_sensor_m3 = std::fmax(task.see_m3, kRemembered_m3);

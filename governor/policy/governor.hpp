@@ -62,6 +62,7 @@ struct GovernorConfig {
   double vehicle_width_m{2.0 * VehicleModel{}.radius_m};  ///< (0, 20]
   /// The most that the cameras can see between the height limits. (0, 1e9]
   double sensor_volume_max_m3{60e3};
+  PrecisionLattice lattice{};
   int coarsest_level{3};  ///< Cells must fit several times into the flight band. [0, kPrecisionLevels)
   /// static-fair: the worst visibility of the congested zones (authors: 8 to 10 m). (0, 1000]
   double design_visibility_m{10.0};

@@ -16,10 +16,10 @@ namespace roborun::governor {
 struct SolverProblem {
   double delta_d_s{};  ///< Time for the three stages together.
   KnobArray<LatencyModel> model{};
-  double p_min_m{kFinestCell_m};  ///< Finest cell of the lattice p_min * 2^k. > 0.
-  int levels{kPrecisionLevels};   ///< Of the lattice, 1 .. kPrecisionLevels.
-  double g_min_m{};               ///< Lower bound of p0.
-  double g_avg_m{};               ///< Upper bounds of p0.
+  double p_min_m{kPublishedCell_m};  ///< Finest cell of the lattice p_min * 2^k. > 0.
+  int levels{kPrecisionLevels};      ///< Of the lattice, 1 .. kPrecisionLevels.
+  double g_min_m{};                  ///< Lower bound of p0.
+  double g_avg_m{};                  ///< Upper bounds of p0.
   double d_obs_m{};
   int p1_coarsest_level{kPrecisionLevels - 1};  ///< Policy: no coarser p1 than this.
   double v_sensor_m3{};

@@ -52,7 +52,8 @@ std::string plot_of(const board::BoardProfile& board, const board::BoardSweep& s
           {}};
       for (int level = 0; level < kPrecisionLevels; ++level) {
         const auto k = static_cast<std::size_t>(level);
-        report::CalibrationCurve curve{cell_size_m(level), model.fixed_s[k], model.slope_s_per_m3[k], {}};
+        report::CalibrationCurve curve{
+            PrecisionLattice{}.cell_size_m(level), model.fixed_s[k], model.slope_s_per_m3[k], {}};
         const auto take = [&](const std::vector<governor::LatencyPoint>& from, bool hold_out) {
           for (const governor::LatencyPoint& p : from) {
             if (p.level == level) curve.points.push_back({p.volume_m3, p.latency_s, hold_out});

@@ -57,7 +57,7 @@ class Problem {
   [[nodiscard]] governor::SolverProblem read(bool& finite_model) const {
     governor::SolverProblem p;
     p.delta_d_s = number("delta_d_s");
-    p.p_min_m = number_or("p_min_m", kFinestCell_m);
+    p.p_min_m = number_or("p_min_m", kPublishedCell_m);
     const double levels = number_or("levels", kPrecisionLevels);
     if (!(levels >= 1 && levels <= kPrecisionLevels) || levels != std::floor(levels))
       refuse("levels", fmt::format("must be a whole number from 1 to {}", kPrecisionLevels));

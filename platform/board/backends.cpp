@@ -24,8 +24,10 @@ stages::BrickMap::Config brick_config(const Aabb& map_bounds_W, const ImageLimit
   config.all_around_frames = images.all_around_frames;
   config.vehicle_radius_m = images.vehicle_radius_m;
   config.thinnest_m = images.thinnest_m;
+  config.lattice = images.lattice;
   if (config.validate() != Status::kOk) {
-    throw InputError("map: the world is too large for the map: at most 4 million bricks of 4.8 m");
+    throw InputError(fmt::format("map: the world is too large for the map: at most 4 million bricks of {} m",
+                                 stages::kBrickCells * images.lattice.finest_m));
   }
   return config;
 }
@@ -35,7 +37,8 @@ std::unique_ptr<stages::OccupancyMap> make_map(const std::string& name, const Pa
   const auto& [bounds_W, images] = request;
   if (name == "own") return std::make_unique<stages::BrickMap>(brick_config(bounds_W, images), arena);
   if (name == "octomap")
-    return stages::make_octomap_backend({bounds_W, images.vehicle_radius_m, images.range_m + 5.0});
+    return stages::make_octomap_backend(
+        {bounds_W, images.vehicle_radius_m, images.lattice, images.range_m + 5.0});
   if (is_plugin(name)) return load_map(name, request);
   throw InputError(fmt::format("unknown map '{}': must be own or octomap, or plugin:FILE.so", name));
 }
@@ -62,10 +65,12 @@ bool uses_plugin(const BackendNames& names) noexcept {
   return is_plugin(names.map) || is_plugin(names.planner);
 }
 
-ImageLimits image_limits(const SensorRig& rig, const VehicleModel& vehicle) noexcept {
+ImageLimits image_limits(const SensorRig& rig, const VehicleModel& vehicle,
+                         const PrecisionLattice& lattice) noexcept {
   ImageLimits limits;
   limits.vehicle_radius_m = vehicle.radius_m;
   limits.thinnest_m = vehicle.thinnest_m;
+  limits.lattice = lattice;
   limits.frames = rig.cameras.size();
   limits.all_around_frames = cameras_see_all_around(rig) ? rig.cameras.size() : 0;
   for (const CameraSpec& camera : rig.cameras) {

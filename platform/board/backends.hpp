@@ -32,7 +32,8 @@ struct OwnParts {
   [[nodiscard]] bool empty() const noexcept { return !map && !planner && !policy; }
 };
 /// Of what this rig delivers.
-[[nodiscard]] ImageLimits image_limits(const SensorRig& rig, const VehicleModel& vehicle) noexcept;
+[[nodiscard]] ImageLimits image_limits(const SensorRig& rig, const VehicleModel& vehicle,
+                                       const PrecisionLattice& lattice) noexcept;
 
 [[nodiscard]] bool uses_plugin(const BackendNames& names) noexcept;
 

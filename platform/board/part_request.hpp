@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "core/geometry/vector.hpp"
+#include "core/precision.hpp"
 #include "core/vehicle_model.hpp"
 
 namespace roborun::board {
@@ -17,6 +18,7 @@ struct ImageLimits {
   /// So many images of cameras see all around; 0: there are not enough of them. (BrickMap::Config)
   std::size_t all_around_frames{6};
   double vehicle_radius_m{VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is.
+  PrecisionLattice lattice{};                        ///< Precisions that are asked for.
   double thinnest_m{VehicleModel{}.thinnest_m};      ///< Must not be forgotten once it was seen.
 };
 

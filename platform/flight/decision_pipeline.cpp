@@ -27,8 +27,8 @@ Vector3 assumed_free_half_m(const VehicleModel& vehicle, bool sees_all_around,
   if (sees_all_around) return Vector3::Zero();
   // What has to be free around the start of a plan, and as far as the sensors see less of it than that while the
   // vehicle turns: at a distance of d they see d * ratio up and down.
-  const double half_m = planned_radius_m(vehicle) + kCornerRoom_m + kFinestCell_m;
-  const double reach_m = std::min((half_m + kFinestCell_m) / level_view_ratio + kFinestCell_m, kMost_m);
+  const double half_m = planned_radius_m(vehicle) + kCornerRoom_m + kPublishedCell_m;
+  const double reach_m = std::min((half_m + kPublishedCell_m) / level_view_ratio + kPublishedCell_m, kMost_m);
   return {std::max(reach_m, half_m), std::max(reach_m, half_m), half_m};
 }
 
@@ -68,7 +68,7 @@ core::MeteredBudget DecisionPipeline::table_budget_of(core::StageId id) noexcept
 void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) noexcept {
   core::MeteredBudget budget = table_budget_of(core::StageId::kPointCloud);
   core::Work work;
-  (void)cloud_.step(in.frames, 0, budget, work);
+  (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), budget, work);
   const double r_m = radius_m();
   const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m),
                         config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};

@@ -12,6 +12,7 @@
 #include "core/geometry/fence.hpp"
 #include "core/geometry/vector.hpp"
 #include "core/memory/static_vector.hpp"
+#include "core/precision.hpp"
 #include "core/sensor_rig.hpp"
 #include "core/trajectory.hpp"
 #include "core/vehicle_model.hpp"
@@ -33,8 +34,9 @@ struct PipelineConfig {
   /// The sensors together see every direction; false: what they do not see may be anything.
   bool sees_all_around{true};
   double level_view_ratio{1.0};  ///< FlightConfig::level_view_ratio.
-  double horizon_m{24.0};        ///< No way-point farther than this: one metre less than the cameras see.
-  core::Fence fence{};           ///< What it forbids is occupied for planner and smoother.
+  PrecisionLattice lattice{};
+  double horizon_m{24.0};  ///< No way-point farther than this: one metre less than the cameras see.
+  core::Fence fence{};     ///< What it forbids is occupied for planner and smoother.
   Nanos minor_frame{core::kMinorFrame};  ///< Of the flight lane: no stop takes over sooner.
   Aabb map_bounds_W{};  ///< What the map stores; its heights limit what counts as seen volume.
 };

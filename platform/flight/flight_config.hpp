@@ -9,6 +9,7 @@
 #include "core/executive/frame_table.hpp"
 #include "core/geometry/fence.hpp"
 #include "core/geometry/vector.hpp"
+#include "core/precision.hpp"
 #include "core/sensor_rig.hpp"
 #include "core/vehicle_model.hpp"
 #include "firmware_if/status.hpp"
@@ -33,8 +34,8 @@ struct FlightConfig {
   double cruise_m{};                 ///< Height of the first hover, world frame.
   core::Fence fence{};               ///< What it forbids is occupied for planner and smoother.
   double camera_range_m{25.0};       ///< Of the cameras that the plans rely on. (1, 200]
-  bool sees_all_around{true};        ///< The cameras together, a sky too; false: what is not seen may be anything.
-  double level_view_ratio{1.0};      ///< Tangent of the elevation, up and down, that one turn sees.
+  bool sees_all_around{true};  ///< The cameras together, a sky too; false: what is not seen may be anything.
+  double level_view_ratio{1.0};  ///< Tangent of the elevation, up and down, that one turn sees.
   GazeConfig gaze{};
   std::array<DepthError, kMostCameras>
       depth_error{};  ///< Of each camera: the map keeps this away from what it saw.
@@ -49,6 +50,8 @@ struct FlightConfig {
   [[nodiscard]] Status validate() const noexcept;
 };
 
+/// The vehicle's own of the design aware; the static ones fly at the published precision.
+[[nodiscard]] PrecisionLattice lattice_of(const FlightConfig& config) noexcept;
 /// What the map has to hold: the flight's bounds and a margin in which surfaces are of interest.
 [[nodiscard]] Aabb map_bounds_W(const FlightConfig& config) noexcept;
 /// What a rig says of a flight: range, what is seen, the size of clouds.

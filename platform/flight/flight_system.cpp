@@ -20,12 +20,13 @@ PipelineConfig pipeline_config(const FlightConfig& config) noexcept {
   pipeline.sees_all_around = config.sees_all_around;
   pipeline.horizon_m = config.camera_range_m - 1.0;
   pipeline.fence = config.fence;
+  pipeline.lattice = lattice_of(config);
   pipeline.minor_frame = config.minor_frame;
   return pipeline;
 }
 
 stages::WayMemory::Config way_config(const FlightConfig& config) noexcept {
-  return {config.bounds_W, planned_radius_m(config.vehicle), config.fence};
+  return {config.bounds_W, planned_radius_m(config.vehicle), lattice_of(config).finest_m, config.fence};
 }
 
 /// The published designs know their horizon alone.
@@ -75,9 +76,15 @@ governor::GovernorConfig governor_config(const FlightConfig& config) noexcept {
   const double range_m = config.camera_range_m;
   const double height_m = map_bounds_W(config).size().z();
   g.sensor_volume_max_m3 = 4.0 * range_m * range_m * std::min(height_m, 2.0 * range_m);
-  g.coarsest_level = coarsest_level_within(config.bounds_W.size().z() / 3.0);
+  g.lattice = lattice_of(config);
+  g.coarsest_level = lattice_of(config).coarsest_level_within(config.bounds_W.size().z() / 3.0);
   g.minor_frame = config.minor_frame;
   return g;
+}
+
+PrecisionLattice lattice_of(const FlightConfig& config) noexcept {
+  const bool aware = config.design == governor::Design::kAware;
+  return aware ? PrecisionLattice{config.vehicle.finest_cell_m} : PrecisionLattice{};
 }
 
 Aabb map_bounds_W(const FlightConfig& config) noexcept {
@@ -111,7 +118,7 @@ FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, 
                            std::span<firmware_if::DepthCamera* const> cameras, const FlightParts& parts,
                            core::Arena& arena, std::span<firmware_if::Lidar* const> lidars) noexcept
     : map_((ROBORUN_ASSERT(config.validate() == Status::kOk), parts.map)),
-      cloud_({}, arena),
+      cloud_({.lattice = lattice_of(config)}, arena),
       ways_(ways_of(config, arena)),
       governor_(governor_config(config)),
       policy_(parts.policy != nullptr ? *parts.policy : governor_),

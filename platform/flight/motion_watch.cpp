@@ -2,13 +2,13 @@
 
 #include <algorithm>
 
-#include "core/precision.hpp"
 #include "stages/perception/polled_view.hpp"
 
 namespace roborun::flight {
 namespace {
 
-constexpr double kReach_m = 15.0;  // farther away depth noise looks like motion
+constexpr double kReach_m = 15.0;     // farther away depth noise looks like motion
+constexpr double kAppeared_m = 0.15;  // around a point, known to be free: depth noise is less
 constexpr int kLeastPoints = 3;
 constexpr double kStanding_mps = 0.5;
 constexpr double kSpacing_m = 0.6;  // of two traces
@@ -30,7 +30,7 @@ void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> poi
     const Vector3 offset = point.p_W - in.p_WB;
     const bool behind = offset.dot(in.v_WB) < 0.0 && in.v_WB.norm() > kStanding_mps;
     if (offset.norm() > kReach_m || behind || !in.relevant_W.contains(point.p_W)) continue;
-    if (!known.is_free_at_finest(Aabb::around(point.p_W, 0.5 * kFinestCell_m), work.units)) continue;
+    if (!known.is_free_at_finest(Aabb::around(point.p_W, kAppeared_m), work.units)) continue;
     const auto place = std::find_if(appeared.begin(), appeared.end(), [&point](const Place& other) {
       return (other.p_W - point.p_W).squaredNorm() < kSpacing_m * kSpacing_m;
     });

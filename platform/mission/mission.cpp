@@ -25,31 +25,27 @@ namespace {
 /// Block by block, at the map's finest.
 report::KnownSlice known_slice(const stages::MapView& view, const Aabb& bounds_W, double height_m) {
   using Cell = report::KnownSlice::Cell;
-  using stages::kBlock_m;
   using stages::kBlockCells;
-  const auto block = [](double at_m) { return static_cast<int>(std::floor(at_m / kBlock_m)); };
+  const double block_m = stages::block_m(view.finest_m());
+  const auto block = [block_m](double at_m) { return static_cast<int>(std::floor(at_m / block_m)); };
   const int x0 = block(bounds_W.min_W.x());
   const int y0 = block(bounds_W.min_W.y());
   const int blocks_x = block(bounds_W.max_W.x()) - x0 + 1;
   const int blocks_y = block(bounds_W.max_W.y()) - y0 + 1;
-  report::KnownSlice slice{height_m,
-                           kBlock_m / kBlockCells,
-                           x0 * kBlock_m,
-                           y0 * kBlock_m,
-                           blocks_x * kBlockCells,
-                           blocks_y * kBlockCells,
-                           {}};
+  report::KnownSlice slice{
+      height_m, view.finest_m(), x0 * block_m, y0 * block_m, blocks_x * kBlockCells, blocks_y * kBlockCells,
+      {}};
   slice.cell.resize(static_cast<std::size_t>(slice.columns) * static_cast<std::size_t>(slice.rows));
   const int z =
-      std::clamp(static_cast<int>(std::floor((height_m - block(height_m) * kBlock_m) / slice.cell_m)), 0,
+      std::clamp(static_cast<int>(std::floor((height_m - block(height_m) * block_m) / slice.cell_m)), 0,
                  kBlockCells - 1);
   stages::CellBlock cells;
   std::uint64_t lookups = 0;
   for (int i = 0; i < blocks_x * blocks_y; ++i) {
     const int column = i % blocks_x;
     const int row = i / blocks_x;
-    const Vector3 corner_W((x0 + column) * kBlock_m, (y0 + row) * kBlock_m, block(height_m) * kBlock_m);
-    const stages::BlockContent content = view.read(corner_W, cells, lookups);
+    const Vector3 corner_W((x0 + column) * block_m, (y0 + row) * block_m, block(height_m) * block_m);
+    const stages::BlockContent content = view.read(corner_W, slice.cell_m, cells, lookups);
     for (int k = 0; k < kBlockCells * kBlockCells; ++k) {
       const int x = k % kBlockCells;
       const int y = k / kBlockCells;
@@ -193,8 +189,8 @@ void MissionRun::record_decision(const flight::DecisionOutput& out) {
   r.time_s = seconds(flight_.now().time_since_epoch());
   r.p_WB = aircraft_.vehicle().state().p_WB;
   r.speed_mps = aircraft_.vehicle().state().v_WB.norm();
-  r.p0_m = cell_size_m(point.p0_level);
-  r.p1_m = cell_size_m(point.p1_level);
+  r.p0_m = lattice_of(flight_config_).cell_size_m(point.p0_level);
+  r.p1_m = lattice_of(flight_config_).cell_size_m(point.p1_level);
   r.v0_m3 = out.work[core::StageId::kMap].volume_m3;
   r.v1_m3 = out.work[core::StageId::kExport].volume_m3;
   r.v2_m3 = out.work[core::StageId::kPlanner].volume_m3;

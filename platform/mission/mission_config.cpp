@@ -60,7 +60,8 @@ Vector3 ground_below(const sitl::World& world) {
 }
 
 board::ImageLimits image_limits(const MissionConfig& config) {
-  return board::image_limits(sitl::rig_of(config.simulator), config.flight.vehicle);
+  return board::image_limits(sitl::rig_of(config.simulator), config.flight.vehicle,
+                             flight::lattice_of(config.flight));
 }
 
 }  // namespace roborun::mission

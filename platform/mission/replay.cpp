@@ -221,8 +221,9 @@ ReplayResult replay_flight(const std::string& path, const std::function<void(dou
   std::vector<firmware_if::Lidar*> lidars;
   lidars.reserve(lidar.size());
   for (ReplayedLidar& l : lidar) lidars.push_back(&l);
-  FlightSetup setup(recorded.flight, recorded.backends,
-                    board::image_limits(recorded.sensors, recorded.flight.vehicle));
+  FlightSetup setup(
+      recorded.flight, recorded.backends,
+      board::image_limits(recorded.sensors, recorded.flight.vehicle, lattice_of(recorded.flight)));
   const auto flight = std::make_unique<flight::LockstepFlight>(recorded.flight, aircraft, cameras,
                                                                setup.parts(), setup.arena(), lidars);
   setup.check();

@@ -320,8 +320,8 @@ HWY_INLINE void look_through(const Look& look, bool are_cells, Marks<unsigned>& 
   marks.mixed |= look.straddling | mixed;
 }
 
-HWY_INLINE float half_edge_m(int level) {
-  return static_cast<float>((level == 0 ? kCore : 1.0) * 0.5 * cell_size_m(level));
+HWY_INLINE float half_edge_m(const PrecisionLattice& lattice, int level) {
+  return static_cast<float>((level == 0 ? kCore : 1.0) * 0.5 * lattice.cell_size_m(level));
 }
 
 }  // namespace roborun::stages::HWY_NAMESPACE

@@ -42,9 +42,10 @@ struct Sight {
   unsigned camera;
 };
 
-HWY_INLINE void place_children(const SightCamera& c, const std::array<float, 3>& p_C, int level, Lanes& at) {
+HWY_INLINE void place_children(const SightCamera& c, const std::array<float, 3>& p_C, double edge_m,
+                               Lanes& at) {
   const Floats d;
-  const auto quarter = hn::Set(d, static_cast<float>(0.25 * cell_size_m(level)));
+  const auto quarter = hn::Set(d, static_cast<float>(0.25 * edge_m));
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     const auto place = [&](std::size_t row) {
       return hn::Add(hn::Set(d, p_C[row]), hn::Mul(quarter, hn::Load(d, c.child[row].data() + i)));
@@ -57,14 +58,14 @@ HWY_INLINE void place_children(const SightCamera& c, const std::array<float, 3>&
 
 /// From the cameras of a node to its children, in `sight`. Returns how many.
 HWY_INLINE std::size_t aim_at_children(const SightCameras& cameras, const Node& node, Sight* sight) {
-  const float half_m = half_edge_m(node.level - 1);
+  const float half_m = half_edge_m(cameras.lattice, node.level - 1);
   std::size_t count = 0;
   for (unsigned set = node.cameras; set != 0; set &= set - 1) {
     const auto k = static_cast<std::size_t>(__builtin_ctz(set));
     const SightCamera& c = cameras.camera[k];
     Sight& s = sight[count++];
     s.camera = static_cast<unsigned>(k);
-    place_children(c, node.p_C[k], node.level, s.at);
+    place_children(c, node.p_C[k], cameras.lattice.cell_size_m(node.level), s.at);
     if (((unsigned{node.inside} >> k) & 1U) != 0) {
       aim<true>(c, half_m, s.at, s.look);
     } else {
@@ -102,7 +103,7 @@ HWY_INLINE void place_blocks(const SightCamera& c, const std::array<const double
 void see_blocks_lanes(const SightCameras& cameras, int level, std::span<const Vector3> center_W,
                       BlocksSeen& seen) {
   const Floats d;
-  const float half_m = half_edge_m(level);
+  const float half_m = half_edge_m(cameras.lattice, level);
   const std::size_t count = std::min(center_W.size(), BlocksSeen::kMost);
   alignas(32) double axis_W[3][BlocksSeen::kMost];
   for (std::size_t i = 0; i < (count + 7) / 8 * 8; ++i)

@@ -5,14 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/precision.hpp"
-
 namespace roborun::stages {
 
 inline constexpr int kBrickLevel = 4;                 ///< A brick is one cell of this level.
 inline constexpr int kBrickCells = 1 << kBrickLevel;  ///< Per edge.
 inline constexpr std::size_t kCellsPerBrick = 4096;
-inline constexpr double kBrick_m = cell_size_m(kBrickLevel);
 
 /// What a cell holds, four bits: unknown, free, or a surface.
 ///   0       unknown

@@ -10,23 +10,28 @@
 namespace roborun::stages {
 namespace {
 
-constexpr double kCoarsest_m = cell_size_m(kPrecisionLevels - 1);
 constexpr double kMaxPositions = 4e6;
 
-std::int32_t even_bricks(double length_m) noexcept {
-  return 2 * static_cast<std::int32_t>(std::ceil(length_m / kCoarsest_m));
+double coarsest_m(const BrickMap::Config& config) noexcept {
+  return config.lattice.cell_size_m(kPrecisionLevels - 1);
 }
 
-Vector3 corner_of(const Aabb& bounds_W) noexcept {
+std::int32_t even_bricks(const BrickMap::Config& config, double length_m) noexcept {
+  return 2 * static_cast<std::int32_t>(std::ceil(length_m / coarsest_m(config)));
+}
+
+Vector3 corner_of(const BrickMap::Config& config) noexcept {
   Vector3 corner;
-  for (int i = 0; i < 3; ++i) corner[i] = std::floor(bounds_W.min_W[i] / kCoarsest_m) * kCoarsest_m;
+  for (int i = 0; i < 3; ++i)
+    corner[i] = std::floor(config.bounds_W.min_W[i] / coarsest_m(config)) * coarsest_m(config);
   return corner;
 }
 
-std::size_t position_count(const Aabb& bounds_W) noexcept {
-  const Vector3 size = bounds_W.max_W - corner_of(bounds_W);
-  return static_cast<std::size_t>(even_bricks(size.x())) * static_cast<std::size_t>(even_bricks(size.y())) *
-         static_cast<std::size_t>(even_bricks(size.z()));
+std::size_t position_count(const BrickMap::Config& config) noexcept {
+  const Vector3 size = config.bounds_W.max_W - corner_of(config);
+  return static_cast<std::size_t>(even_bricks(config, size.x())) *
+         static_cast<std::size_t>(even_bricks(config, size.y())) *
+         static_cast<std::size_t>(even_bricks(config, size.z()));
 }
 
 }  // namespace
@@ -35,9 +40,10 @@ Status BrickMap::Config::validate() const noexcept {
   const Vector3 size = bounds_W.size();
   const bool bounds_ok = is_finite(bounds_W.min_W) && is_finite(bounds_W.max_W) && size.minCoeff() > 0.0 &&
                          size.maxCoeff() <= 40e3;
-  if (!bounds_ok) return Status::kInvalidArgument;
-  const double positions = 8.0 * std::ceil(size.x() / kCoarsest_m + 1) *
-                           std::ceil(size.y() / kCoarsest_m + 1) * std::ceil(size.z() / kCoarsest_m + 1);
+  if (!bounds_ok || !core::within(lattice.finest_m, 0.05, 0.3)) return Status::kInvalidArgument;
+  const Vector3 count = size / coarsest_m(*this);
+  const double positions =
+      8.0 * std::ceil(count.x() + 1) * std::ceil(count.y() + 1) * std::ceil(count.z() + 1);
   const bool ok = positions <= kMaxPositions && core::within<std::size_t>(max_bricks, 64, 200000) &&
                   core::within<std::size_t>(max_frames, 1, kMaxCameras) && all_around_frames <= max_frames &&
                   core::within<std::size_t>(max_image_width, 8, kMaxImageSide) &&
@@ -47,22 +53,21 @@ Status BrickMap::Config::validate() const noexcept {
 }
 
 std::size_t BrickMap::arena_bytes(const Config& config) noexcept {
-  const std::size_t positions = position_count(config.bounds_W);
+  const std::size_t positions = position_count(config);
   return positions * (2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
          config.max_bricks * (sizeof(Brick) + 2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
          config.max_frames * DepthPyramid::arena_bytes(config.max_image_width, config.max_image_height) +
-         config.max_image_width * config.max_image_height * sizeof(float) +
-         16 * alignof(std::max_align_t);
+         config.max_image_width * config.max_image_height * sizeof(float) + 16 * alignof(std::max_align_t);
 }
 
 BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
     // Before the bounds become whole numbers.
     : config_((ROBORUN_ASSERT(config.validate() == Status::kOk), config)),
-      corner_W_(corner_of(config.bounds_W)),
-      nx_(even_bricks(config.bounds_W.max_W.x() - corner_W_.x())),
-      ny_(even_bricks(config.bounds_W.max_W.y() - corner_W_.y())),
-      nz_(even_bricks(config.bounds_W.max_W.z() - corner_W_.z())) {
-  const std::size_t positions = position_count(config.bounds_W);
+      corner_W_(corner_of(config)),
+      nx_(even_bricks(config, config.bounds_W.max_W.x() - corner_W_.x())),
+      ny_(even_bricks(config, config.bounds_W.max_W.y() - corner_W_.y())),
+      nz_(even_bricks(config, config.bounds_W.max_W.z() - corner_W_.z())) {
+  const std::size_t positions = position_count(config);
   // Tables with a place for each position, and the list of free bricks, are in use as a whole from now on.
   slot_ = arena.take<std::int32_t>(positions, "map positions");
   arena.last_pool().use(slot_.size());
@@ -81,11 +86,12 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
   filled_ = arena.take<float>(config.max_image_width * config.max_image_height, "map filled image");
   arena.last_pool().use(filled_.size());
   std::fill(slot_.begin(), slot_.end(), kUnknownBrick);
+  cameras_.lattice = config.lattice;
   free_brick_.fill(evidence::kFree);
   surface_brick_.fill(evidence::kUnknown);
   surface_brick_.mip.back() |= content::kOccupied;
   const auto cell_at = [this](const Vector3& p_W) {
-    const Vector3 local = (p_W - corner_W_) / kFinestCell_m;
+    const Vector3 local = (p_W - corner_W_) / finest_m();
     return Cell{static_cast<std::int32_t>(local.x()), static_cast<std::int32_t>(local.y()),
                 static_cast<std::int32_t>(local.z())};
   };
@@ -110,12 +116,12 @@ const Brick* BrickMap::brick_at(std::size_t position) const noexcept {
 }
 
 Vector3 BrickMap::brick_center_W(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
-  return corner_W_ + kBrick_m * Vector3(bx + 0.5, by + 0.5, bz + 0.5);
+  return corner_W_ + brick_m() * Vector3(bx + 0.5, by + 0.5, bz + 0.5);
 }
 
 bool BrickMap::cell_of(const Vector3& p_W, Cell& cell) const noexcept {
   if (!config_.bounds_W.contains(p_W)) return false;  // also refuses NaN
-  const Vector3 local = (p_W - corner_W_) / kFinestCell_m;
+  const Vector3 local = (p_W - corner_W_) / finest_m();
   cell = {static_cast<std::int32_t>(std::floor(local.x())), static_cast<std::int32_t>(std::floor(local.y())),
           static_cast<std::int32_t>(std::floor(local.z()))};
   return cell.x < nx_ * kBrickCells && cell.y < ny_ * kBrickCells && cell.z < nz_ * kBrickCells;
@@ -165,11 +171,11 @@ void BrickMap::free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noe
 
 void BrickMap::free_vehicle() noexcept {
   const double r_m = config_.vehicle_radius_m;
-  const int n = static_cast<int>(std::ceil(r_m / kFinestCell_m));
+  const int n = static_cast<int>(std::ceil(r_m / finest_m()));
   for (int dz = -n; dz <= n; ++dz) {
     for (int dy = -n; dy <= n; ++dy) {
       for (int dx = -n; dx <= n; ++dx) {
-        const Vector3 offset = kFinestCell_m * Vector3(dx, dy, dz);
+        const Vector3 offset = finest_m() * Vector3(dx, dy, dz);
         Cell cell{};
         if (offset.norm() > r_m || !cell_of(vehicle_W_ + offset, cell)) continue;
         const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
@@ -184,15 +190,15 @@ void BrickMap::free_vehicle() noexcept {
 }
 
 void BrickMap::assume_free(const Vector3& half_m) noexcept {
-  const auto cells = [&half_m](int axis) {
-    return static_cast<int>(std::clamp(half_m[axis], 0.0, 10.0) / kFinestCell_m);
+  const auto cells = [&half_m, this](int axis) {
+    return static_cast<int>(std::clamp(half_m[axis], 0.0, 10.0) / finest_m());
   };
   const int nx = cells(0), ny = cells(1), nz = cells(2);
   for (int dz = -nz; dz <= nz; ++dz) {
     for (int dy = -ny; dy <= ny; ++dy) {
       for (int dx = -nx; dx <= nx; ++dx) {
         Cell cell{};
-        if (!cell_of(vehicle_W_ + kFinestCell_m * Vector3(dx, dy, dz), cell)) continue;
+        if (!cell_of(vehicle_W_ + finest_m() * Vector3(dx, dy, dz), cell)) continue;
         const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
         if (slot_[slot_of(bx, by, bz)] <= kFreeBrick) continue;
         Brick* brick = touch(bx, by, bz);
@@ -261,7 +267,7 @@ void BrickMap::refresh_dirty() noexcept {
 }
 
 double BrickMap::known_volume_m3() const noexcept {
-  return static_cast<double>(known_cells_) * kFinestCell_m * kFinestCell_m * kFinestCell_m;
+  return static_cast<double>(known_cells_) * finest_m() * finest_m() * finest_m();
 }
 
 std::size_t BrickMap::bytes() const noexcept { return arena_bytes(config_); }

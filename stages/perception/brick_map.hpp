@@ -18,16 +18,17 @@
 #include <span>
 
 #include "core/memory/arena.hpp"
+#include "core/precision.hpp"
 #include "core/vehicle_model.hpp"
 #include "stages/perception/block_sight.hpp"
 #include "stages/perception/brick.hpp"
 #include "stages/perception/cloud_images.hpp"
 #include "stages/perception/depth_pyramid.hpp"
 #include "stages/perception/frame_guard.hpp"
+#include "stages/perception/hole_reach.hpp"
 #include "stages/perception/image_lines.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/perception/pixel_kinds.hpp"
-#include "stages/perception/hole_reach.hpp"
 
 namespace roborun::stages {
 
@@ -36,6 +37,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   struct Config {
     /// Space outside is never stored: unknown.
     Aabb bounds_W{Vector3(-100.0, -100.0, -5.0), Vector3(100.0, 100.0, 20.0)};
+    PrecisionLattice lattice{};    ///< Finest cells of [0.05, 0.3] m.
     std::size_t max_bricks{9100};  ///< 1,000,000 m3 at 0.3 m. [64, 200000]
     std::size_t max_frames{6};     ///< Of one scan. [1, 8]
     /// So many images of cameras together see every direction: then what lies between two of them is seen, too.
@@ -93,6 +95,13 @@ class BrickMap final : public OccupancyMap, private MapView {
     std::uint32_t x, y, z;  ///< In cells of `level` from the brick's corner.
   };
 
+  [[nodiscard]] double size_m(int level) const noexcept { return config_.lattice.cell_size_m(level); }
+  [[nodiscard]] double brick_m() const noexcept { return size_m(kBrickLevel); }
+  [[nodiscard]] double finest_m3() const noexcept {
+    const double edge_m = config_.lattice.finest_m;
+    return edge_m * edge_m * edge_m;
+  }
+
   // MapView, in place.
   [[nodiscard]] bool is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
     return box_free(box_W, view_level_, view_radius_m_, lookups);
@@ -101,8 +110,9 @@ class BrickMap final : public OccupancyMap, private MapView {
     return box_free(box_W, 0, std::numeric_limits<double>::infinity(), lookups);
   }
   [[nodiscard]] CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept override;
-  [[nodiscard]] double cell_m() const noexcept override { return cell_size_m(view_level_); }
-  [[nodiscard]] BlockContent read(const Vector3& corner_W, CellBlock& cells,
+  [[nodiscard]] double cell_m() const noexcept override { return size_m(view_level_); }
+  [[nodiscard]] double finest_m() const noexcept override { return config_.lattice.finest_m; }
+  [[nodiscard]] BlockContent read(const Vector3& corner_W, double cell_m, CellBlock& cells,
                                   std::uint64_t& lookups) const noexcept override;
 
   /// The frame with what its holes say.

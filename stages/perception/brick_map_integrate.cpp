@@ -14,8 +14,8 @@ constexpr double kThinPatience = 4.0;
 constexpr double kMoved_m = 1.5;  // about twice a body's radius
 
 /// Tiles of at most half the image that a cell of p0 has at the end of the range.
-int tile_shift(const firmware_if::DepthFrame& frame, int level) noexcept {
-  const double half_cell_m = 0.5 * cell_size_m(std::clamp(level, 0, kPrecisionLevels - 1));
+int tile_shift(const firmware_if::DepthFrame& frame, double p0_m) noexcept {
+  const double half_cell_m = 0.5 * p0_m;
   const double cell_columns =
       frame.width * half_cell_m / static_cast<double>(frame.tan_half_width * frame.range_m);
   const double cell_rows =
@@ -31,7 +31,8 @@ int tile_shift(const firmware_if::DepthFrame& frame, int level) noexcept {
 firmware_if::DepthFrame BrickMap::with_reach(const PosedDepthFrame& posed) noexcept {
   firmware_if::DepthFrame frame = posed.frame;
   const std::size_t pixels = frame.depth_m.size();
-  if (pixels <= filled_.size() && reach_.fill(posed, filled_.first(pixels))) frame.depth_m = filled_.first(pixels);
+  if (pixels <= filled_.size() && reach_.fill(posed, filled_.first(pixels)))
+    frame.depth_m = filled_.first(pixels);
   return frame;
 }
 
@@ -45,7 +46,7 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
     DepthPyramid* const image = cameras_.count < config_.max_frames ? &*pyramid_[cameras_.count] : nullptr;
     // All pixels are read once, by the pyramid: it counts what the guard has to know.
     if (image == nullptr || check_shape(posed) != Status::kOk ||
-        image->build(with_reach(posed), tile_shift(posed.frame, request.level)) != Status::kOk ||
+        image->build(with_reach(posed), tile_shift(posed.frame, size_m(request.level))) != Status::kOk ||
         guard_.check_content(posed) != Status::kOk ||
         (!image->shows_surface() && image->shows_anything() && is_white(posed, request.moved_W))) {
       ++result.frames_refused;
@@ -89,13 +90,13 @@ std::uint32_t BrickMap::packed(const Position& unit) const noexcept {
 }
 
 Vector3 BrickMap::unit_center_W(const Position& unit) const noexcept {
-  return corner_W_ + cell_size_m(unit_level_) * Vector3(unit.x + 0.5, unit.y + 0.5, unit.z + 0.5);
+  return corner_W_ + size_m(unit_level_) * Vector3(unit.x + 0.5, unit.y + 0.5, unit.z + 0.5);
 }
 
 bool BrickMap::is_white(const PosedDepthFrame& posed, std::span<const Vector3> moved_W) const noexcept {
   constexpr int kRays = 8;          // in each direction
   constexpr int kLeastBlocked = 3;  // one may be a stray cell
-  constexpr double kBrickStep_m = 0.5 * kBrick_m, kFineStep_m = 0.5 * kFinestCell_m;
+  const double brick_step_m = 0.5 * brick_m(), fine_step_m = 0.5 * finest_m();
   const firmware_if::DepthFrame& frame = posed.frame;
   if (posed.is_cloud) return false;
   const double end_m = 0.8 * static_cast<double>(frame.range_m);
@@ -107,11 +108,11 @@ bool BrickMap::is_white(const PosedDepthFrame& posed, std::span<const Vector3> m
   const auto meets_surface = [&](const Vector3& ray_W) {
     const double length = ray_W.norm();
     bool near_end = true;  // The brick at that end of the piece has a surface.
-    for (double far_m = kBrickStep_m / length; far_m < end_m; far_m += kBrickStep_m / length) {
+    for (double far_m = brick_step_m / length; far_m < end_m; far_m += brick_step_m / length) {
       const Brick* brick = brick_around(posed.X_WC.p_RT + far_m * ray_W);
       const bool far_end = brick != nullptr && (brick->flags(kBrickLevel, 0) & content::kOccupied) != 0;
       if (!std::exchange(near_end, far_end) && !far_end) continue;
-      for (double at_m = far_m - kBrickStep_m / length; at_m < far_m; at_m += kFineStep_m / length) {
+      for (double at_m = far_m - brick_step_m / length; at_m < far_m; at_m += fine_step_m / length) {
         const Vector3 at_W = posed.X_WC.p_RT + at_m * ray_W;
         brick = brick_around(at_W);
         if (brick != nullptr &&
@@ -142,7 +143,7 @@ double BrickMap::volume_m3(const Vector3& center_W, double edge_m) const noexcep
 }
 
 Aabb BrickMap::reach_W() const noexcept {
-  constexpr double kRounding_m = kFinestCell_m;
+  const double rounding_m = finest_m();
   Vector3 low = cameras_.camera[0].p_WC;
   Vector3 high = low;
   for (std::size_t i = 0; i < cameras_.count; ++i) {
@@ -154,8 +155,8 @@ Aabb BrickMap::reach_W() const noexcept {
           static_cast<double>(c.range_m) *
           (static_cast<double>(c.tan_half_width) * static_cast<double>(std::fabs(c.R_CW[3 + k])) +
            static_cast<double>(c.tan_half_height) * static_cast<double>(std::fabs(c.R_CW[6 + k])));
-      low[axis] = std::min(low[axis], c.p_WC[axis] + std::min(ahead - aside, 0.0) - kRounding_m);
-      high[axis] = std::max(high[axis], c.p_WC[axis] + std::max(ahead + aside, 0.0) + kRounding_m);
+      low[axis] = std::min(low[axis], c.p_WC[axis] + std::min(ahead - aside, 0.0) - rounding_m);
+      high[axis] = std::max(high[axis], c.p_WC[axis] + std::max(ahead + aside, 0.0) + rounding_m);
     }
   }
   const Aabb& bounds = config_.bounds_W;
@@ -169,7 +170,7 @@ std::size_t BrickMap::order_units(const IntegrationRequest& request) noexcept {
   const bool all = request.volume_m3 >= (high - low).prod();
   unit_level_ = all || request.level >= kBlockLevel ? kBlockLevel : kBrickLevel;
   const auto index = [this](double p_m, double corner_m, std::int32_t bricks) {
-    return std::clamp(static_cast<std::int32_t>((p_m - corner_m) / cell_size_m(unit_level_)), 0,
+    return std::clamp(static_cast<std::int32_t>((p_m - corner_m) / size_m(unit_level_)), 0,
                       (bricks >> (unit_level_ - kBrickLevel)) - 1);
   };
   first_unit_ = {index(low.x(), corner_W_.x(), nx_), index(low.y(), corner_W_.y(), ny_),
@@ -212,7 +213,7 @@ void BrickMap::clear_brick(const Position& at, std::uint8_t cameras, int finest,
   const Vector3 center_W = brick_center_W(at.x, at.y, at.z);
   see_brick(cameras_, {center_W, kBrickLevel, cameras}, finest, seen_);
   work.units += seen_.visited;
-  work.volume_m3 += seen_.free_cells * volume_m3(center_W, kBrick_m) / kCellsPerBrick;
+  work.volume_m3 += seen_.free_cells * volume_m3(center_W, brick_m()) / kCellsPerBrick;
   if (seen_.count == 0 || slot_[slot_of(at.x, at.y, at.z)] <= kFreeBrick) return;
   Brick* const brick = touch(at.x, at.y, at.z);
   if (brick == nullptr) return;  // pool full, and nothing farther away to give up
@@ -236,7 +237,7 @@ bool BrickMap::clear_block(const Position& block, std::uint8_t cameras, int fine
                       2 * block.z + (child >> 2)};
     if (((eight.free >> child) & 1) != 0) {
       free_brick(at.x, at.y, at.z);
-      work.volume_m3 += volume_m3(brick_center_W(at.x, at.y, at.z), kBrick_m);
+      work.volume_m3 += volume_m3(brick_center_W(at.x, at.y, at.z), brick_m());
     } else if (((eight.mixed >> child) & 1) != 0 && finest < kBrickLevel) {
       clear_brick(at, eight.cameras[static_cast<std::size_t>(child)], finest, work);
       if (budget.spent(work)) return false;
@@ -269,7 +270,7 @@ std::size_t BrickMap::clear_units(std::size_t count, const IntegrationRequest& r
       const Position& unit = unit_of[i];
       if (((seen.free >> i) & 1U) != 0) {
         free_unit(unit);
-        work.volume_m3 += volume_m3(center_W[i], cell_size_m(unit_level_));
+        work.volume_m3 += volume_m3(center_W[i], size_m(unit_level_));
       } else if (((seen.mixed >> i) & 1U) != 0 && finest < unit_level_) {
         if (!clear_unit(unit, seen.cameras[i], finest, budget, work))
           return first + i + 1;  // what was cleared in it needs its surfaces

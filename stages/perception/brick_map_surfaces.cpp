@@ -13,13 +13,12 @@ constexpr double kThinMost_m = 0.2;
 /// Surfaces differ by more than this at a step, besides the error of the depth.
 constexpr double kStep_m = 0.25;
 constexpr int kTileLevel = 2;  // where a tile may end is known in cells of this size
-constexpr double kTileCell_m = cell_size_m(kTileLevel);
 constexpr std::int32_t kTileCells = 1 << (kBrickLevel - kTileLevel);  // of a brick's edge
 
 /// The depth at which a pixel ends a cell's edge beside where it says (one sigma).
-double exact_reach_m(const DepthError& error) noexcept {
+double exact_reach_m(const DepthError& error, double finest_m) noexcept {
   const double a = error.quadratic_per_m, b = error.angle_rad;
-  const double room_m = std::max(kFinestCell_m - error.constant_m - error.place_m, 0.0);
+  const double room_m = std::max(finest_m - error.constant_m - error.place_m, 0.0);
   // a z^2 + b z = room
   const double root = b + std::sqrt(b * b + 4.0 * a * room_m);
   return root > 0.0 ? std::min(2.0 * room_m / root, static_cast<double>(kMaxRange_m))
@@ -52,7 +51,7 @@ void BrickMap::add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_
                           core::Work& work) noexcept {
   const firmware_if::DepthFrame& frame = camera.posed->frame;
   PixelLine line = camera.line;
-  line.first = direction(camera, static_cast<double>(u0) + 0.5, static_cast<double>(v) + 0.5, kFinestCell_m);
+  line.first = direction(camera, static_cast<double>(u0) + 0.5, static_cast<double>(v) + 0.5, finest_m());
   tell_pixels(frame, v, u0, u1, camera.kinds, pixels_);
   const auto depth_m = std::span(pixels_.depth_m).first(u1 - u0);
   end_cells(line, depth_m, {frame.range_min_m, std::min(camera.exact_m, frame.range_m)}, row_);
@@ -96,7 +95,7 @@ void BrickMap::add_thin_pixels(const SurfaceCamera& camera, const PixelLine& lin
                   static_cast<double>(depth_m) * (static_cast<double>(line.first[k]) +
                                                   static_cast<double>(u) * static_cast<double>(line.step[k]));
       }
-      const Vector3 p_W = corner_W_ + kFinestCell_m * p;
+      const Vector3 p_W = corner_W_ + finest_m() * p;
       Cell cell{};
       if (!cell_of(p_W, cell) || moved_nearby(camera.moved_W, p_W)) continue;
       const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
@@ -163,21 +162,22 @@ void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image,
   const std::size_t columns = (static_cast<std::size_t>(wide.width) + 1) / 2;
   const double across = camera.column_pitch * static_cast<double>(side);
   const double along = camera.row_pitch * static_cast<double>(side);
-  const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kTileCell_m;
+  const double tile_cell_m = size_m(kTileLevel);
+  const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / tile_cell_m;
   TileLine line;
   line.steps_per_m = image.steps_per_m();
   for (int axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<std::size_t>(axis);
     line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
     line.rest[k] = static_cast<float>(origin[axis] - line.origin[k]);
-    line.step[k] = static_cast<float>(-across * R(axis, 1) / kTileCell_m);
+    line.step[k] = static_cast<float>(-across * R(axis, 1) / tile_cell_m);
     line.half[k] = static_cast<float>(0.5 * (across * std::fabs(R(axis, 1)) + along * std::fabs(R(axis, 2))) /
-                                      kTileCell_m);
+                                      tile_cell_m);
   }
   const DepthPyramid::Entry* entry = wide.entry;
   for (std::size_t v = 0; v < frame.height; v += side, entry += 2 * static_cast<std::size_t>(wide.width)) {
     const double half = 0.5 * static_cast<double>(side);
-    line.first = direction(camera, half, static_cast<double>(v) + half, kTileCell_m);
+    line.first = direction(camera, half, static_cast<double>(v) + half, tile_cell_m);
     tile_boxes(line, {entry, 2, columns}, tiles_);
     work.units += columns;
     for (std::size_t x = 0; x < columns; ++x) {
@@ -199,11 +199,11 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work)
     const firmware_if::DepthFrame& frame = camera.posed->frame;
     camera.column_pitch = 2.0 * static_cast<double>(frame.tan_half_width) / frame.width;
     camera.row_pitch = 2.0 * static_cast<double>(frame.tan_half_height) / frame.height;
-    const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / kFinestCell_m;
+    const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / finest_m();
     const DepthError& error = camera.posed->error;
     camera.kinds = {static_cast<float>(kStep_m + SightCamera::kSigmas * error.constant_m),
                     static_cast<float>(SightCamera::kSigmas * error.quadratic_per_m), error.mixes};
-    camera.exact_m = static_cast<float>(exact_reach_m(error));
+    camera.exact_m = static_cast<float>(exact_reach_m(error, finest_m()));
     camera.thin_reach_m = std::min(
         camera.exact_m, static_cast<float>(kThinMost_m / std::max(camera.column_pitch, camera.row_pitch)));
     camera.moved_W = request.moved_W;
@@ -214,7 +214,7 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work)
       camera.line.origin[k] = static_cast<std::int32_t>(std::clamp(std::floor(origin[axis]), -1e8, 1e8));
       camera.line.rest[k] = static_cast<float>(origin[axis] - camera.line.origin[k]);
       camera.line.step[k] =
-          static_cast<float>(-camera.column_pitch / kFinestCell_m * camera.posed->X_WC.R_RT(axis, 1));
+          static_cast<float>(-camera.column_pitch / finest_m() * camera.posed->X_WC.R_RT(axis, 1));
     }
     if (camera.is_coarse()) {
       add_tiles(camera, *pyramid_[i], work);

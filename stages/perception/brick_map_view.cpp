@@ -17,7 +17,6 @@ Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& bu
   // Histogram of known space over distance; the view ends with the last bucket that fits.
   constexpr std::size_t kBuckets = 512;
   constexpr double kBucket_m = 2.4;
-  constexpr double kCell_m3 = kFinestCell_m * kFinestCell_m * kFinestCell_m;
   std::array<std::uint64_t, kBuckets> known{};
   std::size_t position = 0;
   for (std::int32_t bz = 0; bz < nz_; ++bz) {
@@ -40,7 +39,7 @@ Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& bu
   Status status = Status::kOk;
   view_radius_m_ = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < kBuckets; ++i) {
-    const double volume_m3 = static_cast<double>(known[i]) * kCell_m3;
+    const double volume_m3 = static_cast<double>(known[i]) * finest_m3();
     if (work.volume_m3 + volume_m3 > request.volume_m3 && i > 1) {
       view_radius_m_ = static_cast<double>(i) * kBucket_m;
       status = Status::kBudgetSpent;
@@ -114,14 +113,15 @@ bool BrickMap::box_free(const Aabb& box_W, int level, double radius_m,
   return true;
 }
 
-BlockContent BrickMap::read(const Vector3& corner_W, CellBlock& cells,
+BlockContent BrickMap::read(const Vector3& corner_W, double cell_m, CellBlock& cells,
                             std::uint64_t& lookups) const noexcept {
   static_assert(kBlockCells == kBrickCells);
+  if (cell_m != finest_m()) return read_cell_by_cell(*this, corner_W, cell_m, cells, lookups);
   ++lookups;
   Cell corner{};
   if (!is_finite(corner_W)) return BlockContent::kUnknown;
-  const Vector3 middle_W = corner_W + Vector3::Constant(0.5 * kBrick_m);
-  const Vector3 local = (middle_W - corner_W_) / kBrick_m;
+  const Vector3 middle_W = corner_W + Vector3::Constant(0.5 * brick_m());
+  const Vector3 local = (middle_W - corner_W_) / brick_m();
   corner = {static_cast<std::int32_t>(std::floor(local.x())),
             static_cast<std::int32_t>(std::floor(local.y())),
             static_cast<std::int32_t>(std::floor(local.z()))};

@@ -8,7 +8,8 @@
 namespace roborun::stages {
 
 inline constexpr int kBlockCells = 16;  ///< Per edge.
-inline constexpr double kBlock_m = 4.8;
+/// Edge of a block.
+[[nodiscard]] constexpr double block_m(double finest_m) noexcept { return kBlockCells * finest_m; }
 
 /// Bit x of row 16 z + y is the cell (x, y, z) from the block's corner.
 using CellRows = std::array<std::uint16_t, std::size_t{kBlockCells} * kBlockCells>;

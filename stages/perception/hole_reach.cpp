@@ -26,7 +26,8 @@ void HoleReach::begin(const PosedDepthFrame& posed) noexcept {
   Matrix3 R_LW;
   R_LW << c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0;
   const Matrix3 R_LC = R_LW * R_WC;
-  const double across = static_cast<double>(frame.tan_half_width), along = static_cast<double>(frame.tan_half_height);
+  const double across = static_cast<double>(frame.tan_half_width),
+               along = static_cast<double>(frame.tan_half_height);
   const double column_pitch = 2.0 * across / frame.width, row_pitch = 2.0 * along / frame.height;
   const Vector3 first = R_LC * Vector3(1.0, across - 0.5 * column_pitch, along - 0.5 * row_pitch);
   for (int axis = 0; axis < 3; ++axis) {

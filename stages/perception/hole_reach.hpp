@@ -51,7 +51,8 @@ class HoleReach {
   std::array<float, 3> first_{}, right_{}, down_{};
   float columns_per_tan_{};
   std::array<Top, kColumns> top_{};
-  std::array<float, kMaxImageSide> above_m_{}, below_m_{};  ///< The last value of each column of the image; 0: none yet.
+  std::array<float, kMaxImageSide> above_m_{},
+      below_m_{};  ///< The last value of each column of the image; 0: none yet.
 };
 
 }  // namespace roborun::stages

@@ -15,7 +15,7 @@ double spacing_m(const MapView& view, double radius_m) noexcept {
 
 }  // namespace
 
-BlockContent read_cell_by_cell(const MapView& view, const Vector3& corner_W, CellBlock& cells,
+BlockContent read_cell_by_cell(const MapView& view, const Vector3& corner_W, double cell_m, CellBlock& cells,
                                std::uint64_t& lookups) noexcept {
   std::uint32_t free = 0, occupied = 0;
   cells = {};
@@ -23,7 +23,7 @@ BlockContent read_cell_by_cell(const MapView& view, const Vector3& corner_W, Cel
     for (unsigned x = 0; x < kBlockCells; ++x) {
       const std::size_t y = row % kBlockCells, z = row / kBlockCells;
       const Vector3 index(x, static_cast<double>(y), static_cast<double>(z));
-      const CellState state = view.at(corner_W + kFinestCell_m * (index + Vector3::Constant(0.5)), lookups);
+      const CellState state = view.at(corner_W + cell_m * (index + Vector3::Constant(0.5)), lookups);
       const auto bit = static_cast<std::uint16_t>(1U << x);
       if (state == CellState::kFree) cells.free[row] |= bit, ++free;
       if (state == CellState::kOccupied) cells.occupied[row] |= bit, ++occupied;

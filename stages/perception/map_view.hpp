@@ -4,7 +4,6 @@
 #include <cstdint>
 
 #include "core/geometry/vector.hpp"
-#include "core/precision.hpp"
 #include "stages/perception/cell_block.hpp"
 
 namespace roborun::stages {
@@ -12,8 +11,8 @@ namespace roborun::stages {
 enum class CellState : std::uint8_t { kUnknown, kFree, kOccupied };
 
 class MapView;
-[[nodiscard]] BlockContent read_cell_by_cell(const MapView& view, const Vector3& corner_W, CellBlock& cells,
-                                             std::uint64_t& lookups) noexcept;
+[[nodiscard]] BlockContent read_cell_by_cell(const MapView& view, const Vector3& corner_W, double cell_m,
+                                             CellBlock& cells, std::uint64_t& lookups) noexcept;
 
 /// The map at precision p1 inside volume v1. Unknown is not free: whatever was not exported is unknown.
 /// Contract: no call blocks or allocates; all are const and give the same answer for the same map.
@@ -33,11 +32,13 @@ class MapView {
   [[nodiscard]] virtual CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept = 0;
   /// Edge of the cells, cell_size_m(p1).
   [[nodiscard]] virtual double cell_m() const noexcept = 0;
-  /// The 16^3 cells of 0.3 m above a corner whose coordinates are multiples of kBlock_m, of the whole map at its
-  /// finest. `cells` is written if the answer is kMixed. A backend that knows nothing finer answers as at().
-  [[nodiscard]] virtual BlockContent read(const Vector3& corner_W, CellBlock& cells,
+  /// Edge of the finest cells, whatever p1 is.
+  [[nodiscard]] virtual double finest_m() const noexcept { return cell_m(); }
+  /// The 16^3 cells of cell_m, the map's finest, above a corner whose coordinates are multiples of block_m(cell_m), of the
+  /// whole map. `cells` is written if the answer is kMixed. A backend that knows nothing finer answers as at().
+  [[nodiscard]] virtual BlockContent read(const Vector3& corner_W, double cell_m, CellBlock& cells,
                                           std::uint64_t& lookups) const noexcept {
-    return read_cell_by_cell(*this, corner_W, cells, lookups);
+    return read_cell_by_cell(*this, corner_W, cell_m, cells, lookups);
   }
 };
 
@@ -54,7 +55,7 @@ class FinestView final : public MapView {
   [[nodiscard]] CellState at(const Vector3& p_W, std::uint64_t& lookups) const noexcept override {
     return view_.at(p_W, lookups);
   }
-  [[nodiscard]] double cell_m() const noexcept override { return kFinestCell_m; }
+  [[nodiscard]] double cell_m() const noexcept override { return view_.finest_m(); }
 
  private:
   const MapView& view_;

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/precision.hpp"
 #include "core/random/counter_rng.hpp"
 #include "firmware_if/assert.hpp"
 
 namespace roborun::stages {
 
 PointCloud::PointCloud(const Config& config, core::Arena& arena) noexcept
-    : grid_(arena.take<Entry>(config.max_points, "cloud grid")),
+    : lattice_(config.lattice),
+      grid_(arena.take<Entry>(config.max_points, "cloud grid")),
       grid_pool_(arena.last_pool()),
       point_(arena.take<CloudPoint>(config.max_points, "cloud points")),
       point_pool_(arena.last_pool()),
@@ -58,7 +58,7 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core
   seen_volume_m3_ = 0.0;
   work = {};
   work.level = level;
-  const double cell_m = cell_size_m(level);
+  const double cell_m = lattice_.cell_size_m(level);
   guard_.begin(frames);
   std::size_t usable = 0;
   bool full = false;
@@ -86,7 +86,8 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core
         const Vector3 direction_W = posed.X_WC.R_RT * Vector3(1.0, y, z);
         const auto range_m = static_cast<double>(frame.range_m);
         double depth_m = is_value ? std::fmin(static_cast<double>(raw_m), range_m) : range_m;
-        if (is_value && raw_m < frame.range_m && !add(posed.X_WC.p_RT + depth_m * direction_W, cell_m)) full = true;
+        if (is_value && raw_m < frame.range_m && !add(posed.X_WC.p_RT + depth_m * direction_W, cell_m))
+          full = true;
         const double height_m = posed.X_WC.p_RT.z();
         if (direction_W.z() > 0.0)
           depth_m = std::fmin(depth_m, std::fmax(high_m_ - height_m, 0.0) / direction_W.z());

@@ -9,6 +9,7 @@
 
 #include "core/executive/stage_budget.hpp"
 #include "core/memory/arena.hpp"
+#include "core/precision.hpp"
 #include "stages/perception/frame_guard.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/stage.hpp"
@@ -25,6 +26,7 @@ class PointCloud {
  public:
   struct Config {
     std::size_t max_points{65536};  ///< Cells of the grid, a power of two. [256, 4194304]
+    PrecisionLattice lattice{};
     [[nodiscard]] constexpr Status validate() const noexcept {
       const bool power = max_points != 0 && (max_points & (max_points - 1)) == 0;
       return power && max_points >= 256 && max_points <= 4194304 ? Status::kOk : Status::kInvalidArgument;
@@ -41,7 +43,7 @@ class PointCloud {
   /// Precondition, asserted: config.validate() is kOk. Check arena.exhausted() afterwards.
   PointCloud(const Config& config, core::Arena& arena) noexcept;
 
-  /// Averages the surfaces of all frames in cells of cell_size_m(level). Bad frames (FrameGuard) are refused
+  /// Averages the surfaces of all frames in cells of cell_size_m(level) of the lattice. Bad frames (FrameGuard) are refused
   /// whole and counted; when three quarters of the grid are full, further new cells are dropped and counted
   /// (kCapacity). kInvalidArgument if no frame was usable. work.units counts pixels. RT-safe: O(pixels),
   /// polls the budget every row: kBudgetSpent.
@@ -63,6 +65,7 @@ class PointCloud {
   };
   bool add(const Vector3& p_W, double cell_m) noexcept;
 
+  PrecisionLattice lattice_;
   std::span<Entry> grid_;
   core::PoolRecord& grid_pool_;
   std::span<CloudPoint> point_;

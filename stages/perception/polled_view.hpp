@@ -24,6 +24,7 @@ class PolledView final : public MapView {
     return view_.at(p_W, lookups);
   }
   [[nodiscard]] double cell_m() const noexcept override { return view_.cell_m(); }
+  [[nodiscard]] double finest_m() const noexcept override { return view_.finest_m(); }
   [[nodiscard]] bool spent() const noexcept {
     if (!spent_ && work_.units >= next_) {
       spent_ = budget_.spent(work_);

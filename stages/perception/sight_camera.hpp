@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 
+#include "core/precision.hpp"
 #include "stages/perception/depth_pyramid.hpp"
 
 namespace roborun::stages {
@@ -40,6 +41,7 @@ struct SightCamera {
 struct SightCameras {
   std::array<SightCamera, kMaxCameras> camera{};
   std::size_t count{0};
+  PrecisionLattice lattice{};  ///< Of the blocks.
   /// All cameras of the vehicle are there: what lies between two images is seen by them together.
   bool complete{false};
 };

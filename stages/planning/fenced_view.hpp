@@ -21,6 +21,7 @@ class FencedView final : public MapView {
     return fence_.allows(p_W) ? view_.at(p_W, lookups) : CellState::kOccupied;
   }
   [[nodiscard]] double cell_m() const noexcept override { return view_.cell_m(); }
+  [[nodiscard]] double finest_m() const noexcept override { return view_.finest_m(); }
 
  private:
   const MapView& view_;

@@ -38,8 +38,8 @@ LatticeSearch::LatticeSearch(std::size_t max_nodes, core::Arena& arena) noexcept
   cost_pool_.use(0);
 }
 
-bool LatticeSearch::lay_out(const PlanRequest& request, int cells) noexcept {
-  step_m_ = cells * kFinestCell_m;
+bool LatticeSearch::lay_out(const PlanRequest& request, double finest_m, int cells) noexcept {
+  step_m_ = cells * finest_m;
   if (cells > 1 && step_m_ > 2.0 * request.radius_m) return false;
   std::array<std::int32_t, 3> count{};
   double nodes = 1.0;
@@ -48,7 +48,7 @@ bool LatticeSearch::lay_out(const PlanRequest& request, int cells) noexcept {
     const double high = std::fmin(request.bounds_W.max_W[i], request.start_W[i] + request.horizon_m);
     // The low side of the box just inside a cell.
     const double phase = request.radius_m + kPhase_m;
-    corner_W_[i] = std::ceil((low - phase) / kFinestCell_m) * kFinestCell_m + phase;
+    corner_W_[i] = std::ceil((low - phase) / finest_m) * finest_m + phase;
     const double steps = std::fmin(std::floor((high - corner_W_[i]) / step_m_), 1e6);
     if (!(steps >= 0.0)) return false;
     count[static_cast<std::size_t>(i)] = static_cast<std::int32_t>(steps) + 1;
@@ -186,7 +186,7 @@ Status LatticeSearch::connect(const PlanRequest& request, const MapView& view, c
   const Task task{request, view, budget, work};
   path_W.clear();
   for (const int cells : kSteps) {
-    if (!lay_out(request, cells)) continue;
+    if (!lay_out(request, view.finest_m(), cells)) continue;
     seed(task, 0);
     seed(task, 1);
     const Status status = run(task);

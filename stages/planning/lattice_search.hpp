@@ -49,7 +49,7 @@ class LatticeSearch {
   };
 
   /// False if the lattice of this step does not fit.
-  [[nodiscard]] bool lay_out(const PlanRequest& request, int cells) noexcept;
+  [[nodiscard]] bool lay_out(const PlanRequest& request, double finest_m, int cells) noexcept;
   void seed(const Task& task, int side) noexcept;
   [[nodiscard]] Status run(const Task& task) noexcept;
   /// Closes the most promising node of a side; true if it met the other one.

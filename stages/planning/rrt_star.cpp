@@ -96,7 +96,7 @@ double RrtStar::detour_m(const PlanRequest& request, const MapView& view, const 
   const Vector3 side = request.radius_m * Vector3(-ahead.y(), ahead.x(), 0.0);
   const double reach_m = std::fmin(kLookAhead_m, distance_m);
   // Of a wall only the first layer of cells may be known.
-  const double step_m = std::fmax(kFinestCell_m, 0.5 * view.cell_m());
+  const double step_m = std::fmax(view.finest_m(), 0.5 * view.cell_m());
   for (double at_m = request.radius_m; at_m < reach_m; at_m += step_m) {
     for (const double share : {-1.0, 0.0, 1.0}) {
       if (view.at(p_W + at_m * ahead + share * side, lookups) != CellState::kOccupied) continue;
@@ -260,7 +260,8 @@ Status RrtStar::escape(const PlanRequest& request, const MapView& view, PlanResu
                                                            {-1, 1, 0},
                                                            {-1, -1, 0},
                                                            {0, 0, -1}}};
-  for (double distance_m = kFinestCell_m; distance_m <= kEscape_m; distance_m += kFinestCell_m) {
+  const double cell_m = view.finest_m();
+  for (double distance_m = cell_m; distance_m <= kEscape_m; distance_m += cell_m) {
     for (const auto& d : kDirection) {
       const Vector3 direction = Vector3(d[0], d[1], d[2]).normalized();
       const Vector3 end_W = request.start_W + distance_m * direction;
@@ -268,7 +269,7 @@ Status RrtStar::escape(const PlanRequest& request, const MapView& view, PlanResu
           !view.is_free(Aabb::around(end_W, request.radius_m), result.work.units))
         continue;
       bool clear = true;
-      for (double at_m = 0.0; at_m < distance_m && clear; at_m += 0.5 * kFinestCell_m) {
+      for (double at_m = 0.0; at_m < distance_m && clear; at_m += 0.5 * cell_m) {
         clear = view.at(request.start_W + at_m * direction, result.work.units) != CellState::kOccupied;
       }
       if (!clear) continue;

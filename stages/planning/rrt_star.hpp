@@ -7,7 +7,6 @@
 #include <span>
 
 #include "core/memory/arena.hpp"
-#include "core/precision.hpp"
 #include "core/random/counter_rng.hpp"
 #include "stages/planning/lattice_search.hpp"
 #include "stages/planning/node_grid.hpp"

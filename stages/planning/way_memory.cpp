@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/precision.hpp"
 #include "core/random/counter_rng.hpp"
 #include "firmware_if/assert.hpp"
 
@@ -47,8 +46,8 @@ Extent extent_of(const WayMemory::Config& config) noexcept {
   Extent e;
   for (std::size_t i = 0; i < 3; ++i) {
     const auto axis = static_cast<int>(i);
-    const double low = std::floor((config.bounds_W.min_W[axis] - config.radius_m) / kBlock_m);
-    const double high = std::floor(config.bounds_W.max_W[axis] / kBlock_m) + 1.0;
+    const double low = std::floor((config.bounds_W.min_W[axis] - config.radius_m) / block_m(config.finest_m));
+    const double high = std::floor(config.bounds_W.max_W[axis] / block_m(config.finest_m)) + 1.0;
     e.blocks *= std::fmax(high - low, 1.0);
     e.corner[i] = static_cast<std::int32_t>(std::fmax(low, -1e6)) * kBlockCells;
     e.size[i] = static_cast<std::int32_t>(std::fmin(high - low, 1e6));
@@ -71,7 +70,7 @@ std::size_t WayMemory::arena_bytes(const Config& config) noexcept {
 
 WayMemory::WayMemory(const Config& config, core::Arena& arena) noexcept
     : config_((ROBORUN_ASSERT(fits(config)), config)),
-      width_(static_cast<int>(std::ceil(2.0 * config.radius_m / kFinestCell_m - 1e-6))),
+      width_(static_cast<int>(std::ceil(2.0 * config.radius_m / config.finest_m - 1e-6))),
       position_(arena.take<Position>(static_cast<std::size_t>(extent_of(config).blocks), "way positions")),
       position_pool_(arena.last_pool()),
       block_(arena.take<Block>(config.max_blocks, "way blocks")),
@@ -89,14 +88,14 @@ WayMemory::WayMemory(const Config& config, core::Arena& arena) noexcept
 
 WayMemory::Cell WayMemory::place_of(const Vector3& p_W) const noexcept {
   const auto axis = [&](double p, std::int32_t corner) {
-    return whole(p / kFinestCell_m - 0.5 * width_ + 0.5) - corner;
+    return whole(p / config_.finest_m - 0.5 * width_ + 0.5) - corner;
   };
   return {axis(p_W.x(), corner_.x), axis(p_W.y(), corner_.y), axis(p_W.z(), corner_.z)};
 }
 
 Vector3 WayMemory::at_W(const Cell& place) const noexcept {
-  return kFinestCell_m * Vector3(place.x + corner_.x + 0.5 * width_, place.y + corner_.y + 0.5 * width_,
-                                 place.z + corner_.z + 0.5 * width_);
+  return config_.finest_m * Vector3(place.x + corner_.x + 0.5 * width_, place.y + corner_.y + 0.5 * width_,
+                                    place.z + corner_.z + 0.5 * width_);
 }
 
 unsigned WayMemory::room_at(const Cell& place) const noexcept {
@@ -162,10 +161,10 @@ bool WayMemory::read_window(const MapView& map, const Cell& low, const Cell& hig
       if (budget.spent(work)) return false;
       for (std::int32_t x = low.x; x <= high.x + 1; ++x, ++i) {
         const Vector3 corner_W =
-            kFinestCell_m *
+            config_.finest_m *
             Vector3(corner_.x + kBlockCells * x, corner_.y + kBlockCells * y, corner_.z + kBlockCells * z);
         Seen& seen = window_[i];
-        seen.content = map.read(corner_W, seen.cells, work.units);
+        seen.content = map.read(corner_W, config_.finest_m, seen.cells, work.units);
         seen.digest = seen.content == BlockContent::kMixed ? digest_of(seen.cells)
                                                            : static_cast<std::uint64_t>(seen.content);
       }
@@ -195,7 +194,8 @@ Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, c
                        core::Work& work) noexcept {
   if (!is_finite(p_W) || !(p_W.cwiseAbs().maxCoeff() < kMost_m)) return Status::kInvalidArgument;
   const Cell at = place_of(p_W);
-  const auto blocks = static_cast<std::int32_t>(std::ceil(std::fmin(reach_m, kMost_m) / kBlock_m));
+  const auto blocks =
+      static_cast<std::int32_t>(std::ceil(std::fmin(reach_m, kMost_m) / block_m(config_.finest_m)));
   const std::int32_t side = std::min(blocks, (kWindow - 1) / 2),
                      up = std::min(blocks, (kWindowHeight - 1) / 2);
   const Cell low{std::max((at.x >> 4) - side, 0), std::max((at.y >> 4) - side, 0),

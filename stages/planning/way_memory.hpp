@@ -10,16 +10,17 @@
 #include "core/geometry/fence.hpp"
 #include "core/geometry/vector.hpp"
 #include "core/memory/least_first.hpp"
+#include "core/precision.hpp"
 #include "firmware_if/status.hpp"
 #include "stages/perception/map_view.hpp"
 #include "stages/planning/way_rooms.hpp"
 
 namespace roborun::stages {
 
-/// Space is divided into blocks of 4.8 m, and the places of a vehicle inside each into rooms: connected places that are
+/// Space is divided into blocks of 16 finest cells an edge, and the places of a vehicle inside each into rooms: connected places that are
 /// known to be free, or that may be. Doors join rooms of neighbouring blocks, and known with open ones. What was seen
 /// stays, whatever the map gives up. The search runs from the goal over rooms, known space at its length and open space
-/// at kUnknownWeight times its length, until it comes to the vehicle. Exact in what is connected (at 0.3 m), coarse in
+/// at kUnknownWeight times its length, until it comes to the vehicle. Exact in what is connected (at the finest cells), coarse in
 /// lengths. Source: Dijkstra (1959), over the regions of Botea, Mueller, Schaeffer, "Near optimal hierarchical
 /// path-finding" (2004).
 class WayMemory {
@@ -27,6 +28,7 @@ class WayMemory {
   struct Config {
     Aabb bounds_W{};  ///< The vehicle's centre stays inside.
     double radius_m{0.85};
+    double finest_m{kPublishedCell_m};  ///< Edge of the cells of the map.
     core::Fence fence{};
     std::size_t max_blocks{9100};  ///< That are neither free all over nor unknown all over.
   };
@@ -141,7 +143,7 @@ class WayMemory {
   void relax_rooms(std::uint32_t node, const Block& b, unsigned room) noexcept;
   /// Of a metre in a room.
   [[nodiscard]] double price(std::uint32_t position, unsigned room) const noexcept;
-  [[nodiscard]] static std::uint32_t step_cost(const Cell& from, const Cell& to, double price) noexcept;
+  [[nodiscard]] std::uint32_t step_cost(const Cell& from, const Cell& to, double price) const noexcept;
   void wait_at(const Vector3& p_W) noexcept;
 
   Config config_;

@@ -21,8 +21,8 @@ double WayMemory::price(std::uint32_t position, unsigned room) const noexcept {
   return is_known_room(room) ? 1.0 : kUnknownWeight * (1.0 + position_[position].waits / kWaits);
 }
 
-std::uint32_t WayMemory::step_cost(const Cell& from, const Cell& to, double price) noexcept {
-  const double length_m = kFinestCell_m * Vector3(from.x - to.x, from.y - to.y, from.z - to.z).norm();
+std::uint32_t WayMemory::step_cost(const Cell& from, const Cell& to, double price) const noexcept {
+  const double length_m = config_.finest_m * Vector3(from.x - to.x, from.y - to.y, from.z - to.z).norm();
   return static_cast<std::uint32_t>(std::lround(length_m / kCost_m * price));
 }
 

@@ -54,15 +54,18 @@ TEST(StaticVector, RefusesWhatDoesNotFit) {
   EXPECT_EQ(sut.back(), 3);
 }
 
-TEST(Precision, DoublesFromThirtyCentimetres) {
-  EXPECT_DOUBLE_EQ(cell_size_m(0), 0.3);
-  EXPECT_DOUBLE_EQ(cell_size_m(5), 9.6);
-  EXPECT_DOUBLE_EQ(cell_size_m(99), 9.6);
-  EXPECT_EQ(coarsest_level_within(0.1), 0);
-  EXPECT_EQ(coarsest_level_within(1.2), 2);
-  EXPECT_EQ(coarsest_level_within(1.19), 1);
-  EXPECT_EQ(coarsest_level_within(std::numeric_limits<double>::infinity()), 5);
-  EXPECT_EQ(coarsest_level_within(std::numeric_limits<double>::quiet_NaN()), 0);
+TEST(Precision, DoublesFromTheFinestCell) {
+  EXPECT_DOUBLE_EQ(PrecisionLattice{}.cell_size_m(0), 0.3);
+  EXPECT_DOUBLE_EQ(PrecisionLattice{}.cell_size_m(5), 9.6);
+  EXPECT_DOUBLE_EQ(PrecisionLattice{}.cell_size_m(99), 9.6);
+  EXPECT_EQ(PrecisionLattice{}.coarsest_level_within(0.1), 0);
+  EXPECT_EQ(PrecisionLattice{}.coarsest_level_within(1.2), 2);
+  EXPECT_EQ(PrecisionLattice{}.coarsest_level_within(1.19), 1);
+  EXPECT_EQ(PrecisionLattice{}.coarsest_level_within(std::numeric_limits<double>::infinity()), 5);
+  EXPECT_EQ(PrecisionLattice{}.coarsest_level_within(std::numeric_limits<double>::quiet_NaN()), 0);
+  constexpr PrecisionLattice kHalf{0.15};
+  EXPECT_DOUBLE_EQ(kHalf.cell_size_m(5), 4.8);
+  EXPECT_EQ(kHalf.coarsest_level_within(1.2), 3);
 }
 
 TEST(StateHash, IsBlindToTheKindsOfNanAndZero) {

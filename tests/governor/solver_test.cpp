@@ -42,7 +42,9 @@ double exhaustive(const SolverProblem& p) {
   const double v1_max = std::min({p.v_sensor_m3, p.v_map_m3, p.v1_max_m3});
   const double v0_max = std::min(p.v0_max_m3, v1_max);
   for (int p0 = 0; p0 < kPrecisionLevels; ++p0) {
-    if (cell_size_m(p0) > std::min(p.g_avg_m, p.d_obs_m) || cell_size_m(p0) < p.g_min_m) continue;
+    if (PrecisionLattice{}.cell_size_m(p0) > std::min(p.g_avg_m, p.d_obs_m) ||
+        PrecisionLattice{}.cell_size_m(p0) < p.g_min_m)
+      continue;
     for (int p1 = p0; p1 <= p.p1_coarsest_level; ++p1) {
       for (int i = 0; i <= 10; ++i) {
         for (int k = 0; k <= 10; ++k) {
@@ -92,7 +94,9 @@ TEST(LatticeSolver, AmongEqualsItPrefersVolumeThenFinerCells) {
     if (best.status != Status::kOk) continue;
     for (int p0 = 0; p0 < kPrecisionLevels; ++p0) {
       for (int p1 = p0; p1 <= p.p1_coarsest_level; ++p1) {
-        if (cell_size_m(p0) > std::min(p.g_avg_m, p.d_obs_m) || cell_size_m(p0) < p.g_min_m) continue;
+        if (PrecisionLattice{}.cell_size_m(p0) > std::min(p.g_avg_m, p.d_obs_m) ||
+            PrecisionLattice{}.cell_size_m(p0) < p.g_min_m)
+          continue;
         SolverProblem one = p;
         // Other pairs made too slow.
         for (std::size_t k = 0; k < kPrecisionLevels; ++k) {

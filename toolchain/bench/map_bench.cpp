@@ -106,7 +106,7 @@ struct Case {
 std::string name_of(const std::string& who, const Case& c) {
   char text[96];
   std::snprintf(text, sizeof text, "%s/%s/%.1fm/range%d/%dx%d", who.c_str(), c.moving ? "moving" : "first",
-                cell_size_m(c.level), c.range_m, c.pixels, c.pixels);
+                PrecisionLattice{}.cell_size_m(c.level), c.range_m, c.pixels, c.pixels);
   return text;
 }
 
@@ -184,10 +184,10 @@ void cloud(benchmark::State& state, const Case& c) {
 void stock(benchmark::State& state, const Case& c, StockMode mode, bool all_pixels) {
   std::vector<StockScan> scans;
   for (int n = 0; n <= (c.moving ? kMovingScans : 0); ++n)
-    scans.push_back(stock_scan(scan_of(n, c.pixels, c.range_m), all_pixels ? 0.0 : cell_size_m(c.level)));
+    scans.push_back(stock_scan(scan_of(n, c.pixels, c.range_m), all_pixels ? 0.0 : PrecisionLattice{}.cell_size_m(c.level)));
   std::unique_ptr<octomap::OcTree> tree;
   measure(
-      state, c, [&] { tree = std::make_unique<octomap::OcTree>(cell_size_m(c.level)); },
+      state, c, [&] { tree = std::make_unique<octomap::OcTree>(PrecisionLattice{}.cell_size_m(c.level)); },
       [&](int n) { return sum_of(scans[static_cast<std::size_t>(n)]); },
       [&](int n) { insert(*tree, scans[static_cast<std::size_t>(n)], mode); });
   state.counters["bytes"] = static_cast<double>(tree->memoryUsage());
@@ -272,7 +272,7 @@ Agreement agreement(int range_m) {
   OwnMap& map = own_map(128, range_m);
   map.reset();
   map.integrate(scan, 0);
-  octomap::OcTree tree(kFinestCell_m);
+  octomap::OcTree tree(kPublishedCell_m);
   insert(tree, stock_scan(scan, 0.0), StockMode::kPlain);
   std::printf("own map at %d m: %.3f bytes a known cell\n", range_m, map.bytes_per_cell());
   const Agreement result = compare(tree, map.view(), pillar_world(), scan.p_WB(), 1.8 * range_m);
@@ -300,9 +300,9 @@ std::vector<CostOfSpace> costs_of_space() {
     const stages::MapView& view = map.view();
     std::uint64_t lookups = 0;
     const double reach_m = 1.8 * range_m;
-    for (double z = -0.45; z < reach_m; z += kFinestCell_m)
-      for (double y = -reach_m; y < reach_m; y += kFinestCell_m)
-        for (double x = -reach_m; x < reach_m; x += kFinestCell_m)
+    for (double z = -0.45; z < reach_m; z += kPublishedCell_m)
+      for (double y = -reach_m; y < reach_m; y += kPublishedCell_m)
+        for (double x = -reach_m; x < reach_m; x += kPublishedCell_m)
           cost.surface_cells +=
               view.at(Vector3(x, y, z), lookups) == stages::CellState::kOccupied ? 1.0 : 0.0;
     std::printf("own at %d m: %.3f ms, %.0f m3 known, %.0f surface cells\n", range_m, cost.own_ms,
@@ -363,7 +363,7 @@ int main(int argc, char** argv) {
     for (const int range_m : {20, 40}) {
       for (int level = 0; level < roborun::kPrecisionLevels; ++level) {
         const Case c{level, range_m, 128, false};
-        precision.push_back({range_m, roborun::cell_size_m(level), reporter.ms(name_of("own", c)),
+        precision.push_back({range_m, roborun::PrecisionLattice{}.cell_size_m(level), reporter.ms(name_of("own", c)),
                              reporter.best_stock_ms(c)});
       }
     }

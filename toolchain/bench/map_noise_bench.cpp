@@ -27,7 +27,7 @@ namespace {
 
 constexpr int kScans = 20;
 constexpr std::uint16_t kPixels = 128;
-constexpr double kCell_m = kFinestCell_m;
+constexpr double kCell_m = kPublishedCell_m;
 
 struct Sensor {
   std::string name;

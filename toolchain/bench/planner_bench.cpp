@@ -152,7 +152,7 @@ Solve solve(const std::string& name, const Problem& p, bool anytime) {
   const auto info = make_ompl_space(p.view, p.request.bounds_W, kRadius_m, s.lookups);
   info->setMotionValidator(
       std::make_shared<WatchedMotions>(info.get(), info->getMotionValidator(), 2.0 * kMost_s));
-  const auto problem = make_ompl_problem(info, p.request.start_W, p.request.goal_W, kFinestCell_m);
+  const auto problem = make_ompl_problem(info, p.request.start_W, p.request.goal_W, kPublishedCell_m);
   if (!anytime) problem->getOptimizationObjective()->setCostThreshold(ompl::base::Cost(kInfinity));
   const auto planner = allocate_ompl_planner(name, info);
   planner->setProblemDefinition(problem);

@@ -15,7 +15,7 @@ constexpr double kRadius_m = 0.9;
 constexpr double kTop_m = 20.0;
 constexpr double kWall_m = 0.6;
 
-double on_grid(double x) { return kFinestCell_m * std::round(x / kFinestCell_m); }
+double on_grid(double x) { return kPublishedCell_m * std::round(x / kPublishedCell_m); }
 
 /// Free space of this size around a start at (0, 0) and a goal at (length, 0).
 Problem empty(double length_m, double half_width_m, std::uint64_t number) {

@@ -165,12 +165,12 @@ Outcome judge(const Instance& n, std::array<double, 5> x, double time_us, bool s
   o.time_us = time_us;
   const SolverProblem& p = n.problem;
   const auto level = [](double cell) {
-    const int within = coarsest_level_within(cell * (1.0 + 1e-6));
-    return cell > cell_size_m(within) * (1.0 + 1e-6) ? std::min(within + 1, kPrecisionLevels - 1) : within;
+    const int within = PrecisionLattice{}.coarsest_level_within(cell * (1.0 + 1e-6));
+    return cell > PrecisionLattice{}.cell_size_m(within) * (1.0 + 1e-6) ? std::min(within + 1, kPrecisionLevels - 1) : within;
   };
   const int k0 = level(x[0]);
   const int k1 = level(x[1]);
-  const double p0 = cell_size_m(k0);
+  const double p0 = PrecisionLattice{}.cell_size_m(k0);
   const double slack = 1.0 + 1e-6;
   const double v1_most = std::min(p.v_sensor_m3, p.v_map_m3);
   bool finite = true;
@@ -534,7 +534,7 @@ int main(int argc, char** argv) {
     const SolverSolution s = solve(n.problem);
     objective.push_back(s.objective_s2);
     const Outcome o =
-        judge(n, {cell_size_m(s.p0_level), cell_size_m(s.p1_level), s.v0_m3, s.v1_m3, s.v2_m3}, 0.0, false);
+        judge(n, {PrecisionLattice{}.cell_size_m(s.p0_level), PrecisionLattice{}.cell_size_m(s.p1_level), s.v0_m3, s.v1_m3, s.v2_m3}, 0.0, false);
     ours.infeasible += o.infeasible ? 1 : 0;
     ours.late += o.late ? 1 : 0;
     const double dense_begin = now_us();

@@ -13,13 +13,13 @@ template <typename CellFunction>
 void for_each_cell(const octomap::OcTree& tree, CellFunction&& on_cell) {
   for (auto it = tree.begin_leafs(), end = tree.end_leafs(); it != end; ++it) {
     const double edge_m = it.getSize();
-    const int cells = static_cast<int>(std::lround(edge_m / kFinestCell_m));
+    const int cells = static_cast<int>(std::lround(edge_m / kPublishedCell_m));
     const Vector3 corner_W(it.getX() - 0.5 * edge_m, it.getY() - 0.5 * edge_m, it.getZ() - 0.5 * edge_m);
     const bool occupied = tree.isNodeOccupied(*it);
     for (int z = 0; z < cells; ++z)
       for (int y = 0; y < cells; ++y)
         for (int x = 0; x < cells; ++x)
-          on_cell(corner_W + kFinestCell_m * Vector3(x + 0.5, y + 0.5, z + 0.5), occupied);
+          on_cell(corner_W + kPublishedCell_m * Vector3(x + 0.5, y + 0.5, z + 0.5), occupied);
   }
 }
 
@@ -27,7 +27,7 @@ bool occupied_near(const stages::MapView& view, const Vector3& p_W) {
   std::uint64_t lookups = 0;
   if (view.at(p_W, lookups) == CellState::kOccupied) return true;
   for (int axis = 0; axis < 3; ++axis) {
-    for (const double side : {-kFinestCell_m, kFinestCell_m}) {
+    for (const double side : {-kPublishedCell_m, kPublishedCell_m}) {
       Vector3 neighbour_W = p_W;
       neighbour_W[axis] += side;
       if (view.at(neighbour_W, lookups) == CellState::kOccupied) return true;
@@ -84,13 +84,13 @@ Agreement compare(const octomap::OcTree& tree, const stages::MapView& view, cons
       result.stock_false_free += is_solid(world, p_W) ? 1U : 0U;
     }
   });
-  const int reach = static_cast<int>(reach_m / kFinestCell_m);
+  const int reach = static_cast<int>(reach_m / kPublishedCell_m);
   const Vector3 middle_W(0.3 * std::floor(center_W.x() / 0.3) + 0.15, 0.3 * std::floor(center_W.y() / 0.3) + 0.15,
                          0.3 * std::floor(center_W.z() / 0.3) + 0.15);
   for (int z = -reach; z <= reach; ++z) {
     for (int y = -reach; y <= reach; ++y) {
       for (int x = -reach; x <= reach; ++x) {
-        const Vector3 p_W = middle_W + kFinestCell_m * Vector3(x, y, z);
+        const Vector3 p_W = middle_W + kPublishedCell_m * Vector3(x, y, z);
         if (view.at(p_W, lookups) != CellState::kFree) continue;
         ++result.own_free;
         result.own_false_free += is_solid(world, p_W) ? 1U : 0U;

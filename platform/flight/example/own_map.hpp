@@ -68,7 +68,7 @@ class VoxelMap final : public roborun::stages::OccupancyMap {
         if (depth_m <= end_m) cells_.set(posed.X_WC.p_RT + depth_m * ray_W, state);
         continue;
       }
-      const double step_m = 0.5 * roborun::kFinestCell_m / ray_W.norm();
+      const double step_m = 0.5 * kCell_m / ray_W.norm();
       for (double at_m = 0.0; at_m < std::min(end_m, depth_m - 2.0 * step_m); at_m += step_m, ++work.units)
         cells_.set(posed.X_WC.p_RT + at_m * ray_W, state);
     }

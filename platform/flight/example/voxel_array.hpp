@@ -8,7 +8,9 @@
 
 namespace example {
 
-using roborun::Aabb, roborun::kFinestCell_m, roborun::Vector3, roborun::stages::CellState;
+inline constexpr double kCell_m = 0.3;
+
+using roborun::Aabb, roborun::Vector3, roborun::stages::CellState;
 
 /// Unknown is not free, and what lies outside of the array or of the window is unknown.
 class VoxelArray final : public roborun::stages::MapView {
@@ -21,7 +23,7 @@ class VoxelArray final : public roborun::stages::MapView {
   void set(const Vector3& p_W, CellState to) noexcept {
     const Index at = index_of(p_W);
     if (!holds(at)) return;
-    known_m3_ += state(at) == CellState::kUnknown ? kFinestCell_m * kFinestCell_m * kFinestCell_m : 0.0;
+    known_m3_ += state(at) == CellState::kUnknown ? kCell_m * kCell_m * kCell_m : 0.0;
     cell_[flat(at)] = to;
   }
   void show(const Aabb& window_W) noexcept { window_W_ = window_W; }
@@ -53,13 +55,13 @@ class VoxelArray final : public roborun::stages::MapView {
     ++lookups;
     return window_W_.contains(p_W) ? state(index_of(p_W)) : CellState::kUnknown;
   }
-  [[nodiscard]] double cell_m() const noexcept override { return kFinestCell_m; }
+  [[nodiscard]] double cell_m() const noexcept override { return kCell_m; }
 
  private:
   using Index = Eigen::Array<long, 3, 1>;
   /// Clamped before it becomes an integer; outside stays outside.
   [[nodiscard]] Index index_of(const Vector3& p_W) const noexcept {
-    return ((p_W - min_W_).array() / kFinestCell_m).floor().max(-1.0).min(1e6).cast<long>();
+    return ((p_W - min_W_).array() / kCell_m).floor().max(-1.0).min(1e6).cast<long>();
   }
   [[nodiscard]] bool holds(const Index& at) const noexcept { return (at >= 0).all() && (at < size_).all(); }
   [[nodiscard]] CellState state(const Index& at) const noexcept {

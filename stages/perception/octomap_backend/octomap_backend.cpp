@@ -10,7 +10,6 @@
 #include <tuple>
 #include <vector>
 
-#include "core/precision.hpp"
 #include "core/record/state_hash.hpp"
 #include "firmware_if/assert.hpp"
 #include "stages/perception/depth_steps.hpp"
@@ -33,7 +32,7 @@ class OctomapBackend final : public OccupancyMap, private MapView {
  public:
   explicit OctomapBackend(const OctomapConfig& config) : config_(config) {
     for (int level = 0; level < kPrecisionLevels; ++level) {
-      tree_[static_cast<std::size_t>(level)] = std::make_unique<octomap::OcTree>(cell_size_m(level));
+      tree_[static_cast<std::size_t>(level)] = std::make_unique<octomap::OcTree>(size_m(level));
     }
   }
 
@@ -105,7 +104,7 @@ class OctomapBackend final : public OccupancyMap, private MapView {
   Status insert(const IntegrationRequest& request, core::StageBudget& budget, IntegrationResult& result) {
     result = {};
     const int level = std::clamp(request.level, 0, kPrecisionLevels - 1);
-    const double cell_m = cell_size_m(level);
+    const double cell_m = size_m(level);
     result.work.level = level;
     octomap::OcTree& tree = *tree_[static_cast<std::size_t>(level)];
     bool any = false;
@@ -203,9 +202,9 @@ class OctomapBackend final : public OccupancyMap, private MapView {
     work = {};
     work.level = std::clamp(request.level, 0, kPrecisionLevels - 1);
     if (!is_finite(request.center_W) || !(request.volume_m3 >= 0.0)) return Status::kInvalidArgument;
-    cell_m_ = cell_size_m(work.level);
-    // The window at 0.3 m, aligned to the coarsest lattice so that cells of p1 never straddle its border.
-    const double coarse_m = cell_size_m(kPrecisionLevels - 1);
+    cell_m_ = size_m(work.level);
+    // The window at its finest, aligned to the coarsest lattice so that cells of p1 never straddle its border.
+    const double coarse_m = size_m(kPrecisionLevels - 1);
     std::array<std::int64_t, 3> fine{};
     for (std::size_t i = 0; i < 3; ++i) {
       const auto axis = static_cast<Eigen::Index>(i);
@@ -240,8 +239,8 @@ class OctomapBackend final : public OccupancyMap, private MapView {
   void paint(const std::array<std::int64_t, 3>& fine, std::vector<std::uint8_t>& state,
              core::Work& work) const {
     const Vector3 max_W =
-        min_W_ + kFinestCell_m * Vector3(static_cast<double>(fine[0]), static_cast<double>(fine[1]),
-                                         static_cast<double>(fine[2]));
+        min_W_ + finest_m() * Vector3(static_cast<double>(fine[0]), static_cast<double>(fine[1]),
+                                      static_cast<double>(fine[2]));
     for (std::size_t level = tree_.size(); level-- > 0;) {
       const octomap::OcTree& tree = *tree_[level];
       if (tree.size() == 0) continue;
@@ -254,8 +253,8 @@ class OctomapBackend final : public OccupancyMap, private MapView {
         const octomap::point3d center = it.getCoordinate();
         for (unsigned i = 0; i < 3; ++i) {
           const double local_m = static_cast<double>(center(i)) - min_W_[static_cast<Eigen::Index>(i)];
-          low[i] = std::clamp<std::int64_t>(std::lround((local_m - half_m) / kFinestCell_m), 0, fine[i]);
-          high[i] = std::clamp<std::int64_t>(std::lround((local_m + half_m) / kFinestCell_m), 0, fine[i]);
+          low[i] = std::clamp<std::int64_t>(std::lround((local_m - half_m) / finest_m()), 0, fine[i]);
+          high[i] = std::clamp<std::int64_t>(std::lround((local_m + half_m) / finest_m()), 0, fine[i]);
         }
         const std::uint8_t value = tree.isNodeOccupied(*it) ? kOccupied : kFree;
         for (std::int64_t z = low[2]; z < high[2]; ++z) {
@@ -271,12 +270,12 @@ class OctomapBackend final : public OccupancyMap, private MapView {
   /// What is farther from the centre than v1 reaches becomes unknown again.
   void limit_volume(const ExportRequest& request, const std::array<std::int64_t, 3>& fine,
                     std::vector<std::uint8_t>& state, core::Work& work) {
-    constexpr double kCell_m3 = kFinestCell_m * kFinestCell_m * kFinestCell_m;
+    const double cell_m3 = finest_m() * finest_m() * finest_m();
     std::vector<double> ring_m3(128, 0.0);
     const auto ring_of = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
       const Vector3 p_W =
-          min_W_ + kFinestCell_m * Vector3(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5,
-                                           static_cast<double>(z) + 0.5);
+          min_W_ + finest_m() * Vector3(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5,
+                                        static_cast<double>(z) + 0.5);
       return std::min(static_cast<std::size_t>((p_W - request.center_W).norm()), ring_m3.size() - 1);
     };
     known_m3_ = 0.0;
@@ -284,8 +283,8 @@ class OctomapBackend final : public OccupancyMap, private MapView {
       for (std::int64_t y = 0; y < fine[1]; ++y) {
         for (std::int64_t x = 0; x < fine[0]; ++x) {
           if (state[static_cast<std::size_t>((z * fine[1] + y) * fine[0] + x)] == kUnknown) continue;
-          ring_m3[ring_of(x, y, z)] += kCell_m3;
-          known_m3_ += kCell_m3;
+          ring_m3[ring_of(x, y, z)] += cell_m3;
+          known_m3_ += cell_m3;
         }
       }
     }
@@ -360,11 +359,13 @@ class OctomapBackend final : public OccupancyMap, private MapView {
                               : CellState::kUnknown;
   }
   [[nodiscard]] double cell_m() const noexcept override { return cell_m_; }
+  [[nodiscard]] double finest_m() const noexcept override { return config_.lattice.finest_m; }
+  [[nodiscard]] double size_m(int level) const noexcept { return config_.lattice.cell_size_m(level); }
 
   OctomapConfig config_;
   std::array<std::unique_ptr<octomap::OcTree>, kPrecisionLevels> tree_;
   Vector3 min_W_ = Vector3::Zero();
-  double cell_m_{kFinestCell_m};
+  double cell_m_{kPublishedCell_m};
   std::array<std::int64_t, 3> count_{};
   std::vector<std::uint8_t> cell_;
   std::vector<std::int32_t> sum_;

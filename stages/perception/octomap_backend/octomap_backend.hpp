@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "core/geometry/vector.hpp"
+#include "core/precision.hpp"
 #include "core/range.hpp"
 #include "core/vehicle_model.hpp"
 #include "stages/perception/occupancy_map.hpp"
@@ -14,7 +15,8 @@ namespace roborun::stages {
 struct OctomapConfig {
   Aabb bounds_W{};                                   ///< Space outside is never stored: unknown.
   double vehicle_radius_m{VehicleModel{}.radius_m};  ///< Where the vehicle is, nothing else is.
-  double view_reach_m{30.0};                         ///< Half the side of the exported window. (0, 1000]
+  PrecisionLattice lattice{};
+  double view_reach_m{30.0};  ///< Half the side of the exported window. (0, 1000]
   [[nodiscard]] Status validate() const noexcept {
     const bool ok = is_finite(bounds_W.min_W) && is_finite(bounds_W.max_W) &&
                     bounds_W.size().minCoeff() > 0.0 && core::above(view_reach_m, 0.0, 1000.0);

@@ -34,7 +34,7 @@ class Map final : public stages::OccupancyMap, stages::MapView {
   [[nodiscard]] stages::CellState at(const Vector3&, std::uint64_t&) const noexcept override {
     return stages::CellState::kUnknown;
   }
-  [[nodiscard]] double cell_m() const noexcept override { return kFinestCell_m; }
+  [[nodiscard]] double cell_m() const noexcept override { return kPublishedCell_m; }
 
   std::size_t side_;
 };

@@ -151,7 +151,7 @@ TEST_F(BlockSight, ABlockIsFreeOnlyIfEveryRayThroughItSeesPastIt) {
       if (((seen.free >> i) & 1U) == 0) continue;
       ++free_blocks;
       for (int k = 0; k < 20; ++k) {
-        const double half = 0.5 * cell_size_m(level);
+        const double half = 0.5 * PrecisionLattice{}.cell_size_m(level);
         const Vector3 p_W =
             center_W[i] + half * Vector3(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1));
         const Vector3 p_C = frames_[0].X_WC.inverse_times(p_W);
@@ -173,7 +173,7 @@ TEST_F(BlockSight, ABlockIsFreeOnlyIfEveryRayThroughItSeesPastIt) {
 void see_slowly(const SightCameras& cameras, const SightBlock& block, std::uint32_t morton,
                 std::bitset<kCellsPerBrick>& free) {
   const EightSeen eight = see_children(cameras, block);
-  const double quarter = 0.25 * cell_size_m(block.level);
+  const double quarter = 0.25 * PrecisionLattice{}.cell_size_m(block.level);
   const std::uint32_t cells = std::uint32_t{1} << (3U * static_cast<unsigned>(block.level - 1));
   for (std::uint32_t i = 0; i < 8; ++i) {
     const std::uint32_t child = 8 * morton + i;

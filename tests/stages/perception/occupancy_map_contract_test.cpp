@@ -157,7 +157,7 @@ TEST_P(OccupancyMapContract, ACoarserViewIsNeverFreer) {
   for (int level = 1; level < kPrecisionLevels; ++level) {
     core::Work work;
     ASSERT_EQ(sut_->export_view({level, kInfinity, at_}, unlimited_, work), Status::kOk);
-    EXPECT_EQ(sut_->view().cell_m(), cell_size_m(level));
+    EXPECT_EQ(sut_->view().cell_m(), PrecisionLattice{}.cell_size_m(level));
     for (std::size_t i = 0; i < points.size(); ++i) {
       const CellState coarse = at(points[i]);
       if (finest[i] == CellState::kOccupied) {

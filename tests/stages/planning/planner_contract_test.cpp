@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "core/precision.hpp"
 #include "core/random/counter_rng.hpp"
 #include "stages/planning/fenced_view.hpp"
 #include "stages/planning/ompl_backend/ompl_backend.hpp"
@@ -281,7 +282,7 @@ TEST_F(RrtStarTest, GoesAsideOfAWallOfOneCellAhead) {
   test::BoxView view;
   view.free_W = {Vector3(-24, -24, 0), Vector3(2, 24, 12)};
   for (const double wall_m : {1.7, 1.8, 1.9}) {
-    view.occupied = {{Vector3(wall_m, -0.6, 0), Vector3(wall_m + kFinestCell_m, 0.6, 12)}};
+    view.occupied = {{Vector3(wall_m, -0.6, 0), Vector3(wall_m + kPublishedCell_m, 0.6, 12)}};
     const Status status = sut_.plan(request_to(Vector3(42, 0, 5)), view, unlimited_, result_);
     ASSERT_EQ(status, Status::kOk) << wall_m;
     EXPECT_GT(std::abs(result_.path_W.back().y()), 1.4) << wall_m;
