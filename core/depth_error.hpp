@@ -14,6 +14,8 @@ struct DepthError {
   double angle_rad{0.0};
   /// Pixels at the edge of what is in front may lie anywhere between it and what is behind.
   bool mixes{false};
+  /// Sky has no values: it is a hole like any other.
+  bool dark_sky{false};
 
   [[nodiscard]] constexpr double at_m(double depth_m) const noexcept {
     return constant_m + quadratic_per_m * depth_m * depth_m;

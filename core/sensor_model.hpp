@@ -84,8 +84,9 @@ inline constexpr StereoOptics kOakD{0.075, 441.0, 0.10, 1.0 / 8.0, 95.0};
 [[nodiscard]] inline DepthError depth_error(CameraModel model) noexcept {
   constexpr double kMount_m = 0.003, kMount_rad = 0.0035;
   if (const StereoOptics* optics = stereo_of(model))
-    return {0.0, std::sqrt(optics->variance_per_m4()), kMount_m, kMount_rad, true};
-  return model == CameraModel::kTof ? DepthError{0.002, 0.0012, kMount_m, kMount_rad, true} : DepthError{};
+    return {0.0, std::sqrt(optics->variance_per_m4()), kMount_m, kMount_rad, true, true};
+  return model == CameraModel::kTof ? DepthError{0.002, 0.0012, kMount_m, kMount_rad, true, true}
+                                    : DepthError{};
 }
 
 }  // namespace roborun

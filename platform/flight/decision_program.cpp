@@ -162,8 +162,10 @@ void DecisionProgram::look(const FlightReport& report, MonotonicTime now) noexce
     const std::size_t sensor = sensor_of_[i];
     const bool usable = fault_[i] == stages::FrameFault::kNone;
     last_fault_[sensor] = fault_[i];
-    // On the ground and close to it a camera may see nothing: all of it is nearer than its least range.
-    const bool may_be_dark = !report.airborne && frames_[i].frame.range_min_m > 0.0F;
+    // On the ground and close to it a camera may see nothing: all of it is nearer than its least range, which a product has
+    // whatever the frame says.
+    const bool may_be_dark =
+        !report.airborne && (frames_[i].frame.range_min_m > 0.0F || frames_[i].error.dark_sky);
     if (usable || may_be_dark) last_usable_[sensor] = frames_[i].frame.stamp;
     if (!usable) continue;
     ++scan[sensor < kMostCameras ? 0 : 1 + sensor - kMostCameras];

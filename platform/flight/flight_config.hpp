@@ -34,8 +34,8 @@ struct FlightConfig {
   double cruise_m{};                 ///< Height of the first hover, world frame.
   core::Fence fence{};               ///< What it forbids is occupied for planner and smoother.
   double camera_range_m{25.0};       ///< Of the cameras that the plans rely on. (1, 200]
-  bool sees_all_around{true};        ///< The cameras together; false: what is not seen may be anything.
-  double level_view_ratio{1.0};      ///< Tangent of the elevation, up and down, that one turn sees.
+  bool sees_all_around{true};  ///< The cameras together, a sky too; false: what is not seen may be anything.
+  double level_view_ratio{1.0};  ///< Tangent of the elevation, up and down, that one turn sees.
   double too_near_m{};  ///< Half of the cube around the vehicle that may be too near for its sensors.
   GazeConfig gaze{};
   std::array<DepthError, kMostCameras>

@@ -99,8 +99,11 @@ void describe_sensors(const SensorRig& rig, FlightConfig& config) noexcept {
   config.level_view_ratio = level_view_ratio(rig);
   config.too_near_m = too_near_m(rig);
   config.gaze.follows = !sees_horizon(rig);
-  for (std::size_t i = 0; i < rig.cameras.size(); ++i)
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     config.depth_error[i] = depth_error(rig.cameras[i].model);
+    // Of the sky above nothing is known that the level cameras have not seen.
+    config.sees_all_around = config.sees_all_around && !config.depth_error[i].dark_sky;
+  }
   config.cloud_pixels = {};
   for (std::size_t i = 0; i < rig.lidars.size(); ++i) config.cloud_pixels[i] = cloud_pixels(rig.lidars[i]);
 }

@@ -20,23 +20,29 @@ void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> poi
                         const stages::MapView& known_view, core::StageBudget& budget,
                         core::Work& work) noexcept {
   const stages::PolledView known(known_view, budget, work);
-  core::StaticVector<Vector3, kTraces / 4> appeared_W;
-  int appeared = 0;
+  struct Place {
+    Vector3 p_W;
+    int points;
+  };
+  core::StaticVector<Place, kTraces / 4> appeared;
   for (const stages::CloudPoint& point : points) {
     const Vector3 offset = point.p_W - in.p_WB;
     const bool behind = offset.dot(in.v_WB) < 0.0 && in.v_WB.norm() > kStanding_mps;
     if (offset.norm() > kReach_m || behind || !in.relevant_W.contains(point.p_W)) continue;
     if (!known.is_free_at_finest(Aabb::around(point.p_W, kAppeared_m), work.units)) continue;
-    ++appeared;
-    const bool noted = std::any_of(appeared_W.begin(), appeared_W.end(), [&point](const Vector3& other_W) {
-      return (other_W - point.p_W).squaredNorm() < kSpacing_m * kSpacing_m;
+    const auto place = std::find_if(appeared.begin(), appeared.end(), [&point](const Place& other) {
+      return (other.p_W - point.p_W).squaredNorm() < kSpacing_m * kSpacing_m;
     });
-    if (!noted && !appeared_W.push_back(point.p_W)) break;
+    if (place != appeared.end())
+      ++place->points;
+    else if (!appeared.push_back({point.p_W, 1}))
+      break;
   }
-  if (appeared < kLeastPoints) return;
-  moving_until_ = in.now + kMemory;
-  for (const Vector3& p_W : appeared_W) {
-    trace_[next_trace_] = {p_W, in.now + kTraceMemory};
+  // A body is in one place; pixels between two depths lie here and there.
+  for (const Place& place : appeared) {
+    if (place.points < kLeastPoints) continue;
+    moving_until_ = in.now + kMemory;
+    trace_[next_trace_] = {place.p_W, in.now + kTraceMemory};
     next_trace_ = (next_trace_ + 1) % kTraces;
   }
 }

@@ -57,7 +57,7 @@ std::size_t BrickMap::arena_bytes(const Config& config) noexcept {
   return positions * (2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
          config.max_bricks * (sizeof(Brick) + 2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
          config.max_frames * DepthPyramid::arena_bytes(config.max_image_width, config.max_image_height) +
-         16 * alignof(std::max_align_t);
+         config.max_image_width * config.max_image_height * sizeof(float) + 16 * alignof(std::max_align_t);
 }
 
 BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
@@ -83,6 +83,8 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
   dirty_pool_ = &arena.last_pool();
   known_count_ = arena.take<std::uint16_t>(config.max_bricks, "map known counts");
   known_pool_ = &arena.last_pool();
+  filled_ = arena.take<float>(config.max_image_width * config.max_image_height, "map filled image");
+  arena.last_pool().use(filled_.size());
   cameras_.lattice = config.lattice;
   free_brick_.fill(evidence::kFree);
   surface_brick_.fill(evidence::kUnknown);

@@ -25,6 +25,7 @@
 #include "stages/perception/cloud_images.hpp"
 #include "stages/perception/depth_pyramid.hpp"
 #include "stages/perception/frame_guard.hpp"
+#include "stages/perception/hole_reach.hpp"
 #include "stages/perception/image_lines.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/perception/pixel_kinds.hpp"
@@ -115,6 +116,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   [[nodiscard]] BlockContent read(const Vector3& corner_W, double cell_m, CellBlock& cells,
                                   std::uint64_t& lookups) const noexcept override;
 
+  /// The frame with what its holes say.
+  [[nodiscard]] firmware_if::DepthFrame with_reach(const PosedDepthFrame& posed) noexcept;
   [[nodiscard]] std::size_t usable_frames(const IntegrationRequest& request,
                                           IntegrationResult& result) noexcept;
   /// Of a frame without any surface: the map has surfaces in its view, so that it is more likely a white
@@ -231,6 +234,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   std::size_t free_count_{0};
   std::size_t dirty_count_{0};
   FrameGuard guard_{};
+  HoleReach reach_{};
+  std::span<float> filled_;  ///< An image.
   SightCameras cameras_{};
   BrickSeen seen_{};
   PixelRow pixels_{};

@@ -28,6 +28,14 @@ int tile_shift(const firmware_if::DepthFrame& frame, double p0_m) noexcept {
 
 }  // namespace
 
+firmware_if::DepthFrame BrickMap::with_reach(const PosedDepthFrame& posed) noexcept {
+  firmware_if::DepthFrame frame = posed.frame;
+  const std::size_t pixels = frame.depth_m.size();
+  if (pixels <= filled_.size() && reach_.fill(posed, filled_.first(pixels)))
+    frame.depth_m = filled_.first(pixels);
+  return frame;
+}
+
 std::size_t BrickMap::usable_frames(const IntegrationRequest& request, IntegrationResult& result) noexcept {
   std::size_t clouds = 0;
   bool any = false;
@@ -38,7 +46,7 @@ std::size_t BrickMap::usable_frames(const IntegrationRequest& request, Integrati
     DepthPyramid* const image = cameras_.count < config_.max_frames ? &*pyramid_[cameras_.count] : nullptr;
     // All pixels are read once, by the pyramid: it counts what the guard has to know.
     if (image == nullptr || check_shape(posed) != Status::kOk ||
-        image->build(posed.frame, tile_shift(posed.frame, size_m(request.level))) != Status::kOk ||
+        image->build(with_reach(posed), tile_shift(posed.frame, size_m(request.level))) != Status::kOk ||
         guard_.check_content(posed) != Status::kOk ||
         (!image->shows_surface() && image->shows_anything() && is_white(posed, request.moved_W))) {
       ++result.frames_refused;

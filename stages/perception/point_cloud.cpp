@@ -82,10 +82,12 @@ bool PointCloud::add_row(const Row& row, double cell_m, Wanted& wanted) noexcept
   const float* const raw = frame.depth_m.data() + row.v * frame.width;
   bool room = true;
   for (std::size_t u = 0; u < frame.width; ++u) {
-    if (!(raw[u] > frame.range_min_m)) continue;
+    const bool is_value = raw[u] > frame.range_min_m;
+    // A hole may be sky: what the map makes of it is its own matter, but it must be allowed to.
+    if (!is_value && !row.posed.error.dark_sky) continue;
     const Vector3 direction_W = row.posed.X_WC.R_RT * Vector3(1.0, row.y[u], row.z);
-    double depth_m = std::fmin(static_cast<double>(raw[u]), range_m);
-    if (raw[u] < frame.range_m) {
+    double depth_m = is_value ? std::fmin(static_cast<double>(raw[u]), range_m) : range_m;
+    if (is_value && raw[u] < frame.range_m) {
       const Vector3 p_W = from_W + depth_m * direction_W;
       if (wanted.includes(p_W) && !add(p_W, cell_m)) room = false;
     }

@@ -19,12 +19,18 @@ constexpr int kPixels = 64;
 class NoisyImages : public ::testing::Test {
  protected:
   NoisyImages() : block_(64U << 20U), arena_(block_) {
+    begin();
+    scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)}, {Vector3(8, -2, 0), Vector3(12, 2, 12)}};
+  }
+  /// With an empty map.
+  void begin() {
+    arena_.~Arena();
+    new (&arena_) core::Arena(block_);
     BrickMap::Config config;
     config.bounds_W = {Vector3(-30, -30, -3), Vector3(30, 30, 12)};
     config.max_bricks = 2000;
     config.max_image_width = config.max_image_height = kPixels;
     sut_ = std::make_unique<BrickMap>(config, arena_);
-    scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)}, {Vector3(8, -2, 0), Vector3(12, 2, 12)}};
   }
   using Change = std::function<void(std::vector<float>&)>;
   /// One scan of all six cameras, each image changed.
@@ -72,13 +78,7 @@ TEST_F(NoisyImages, LostPixelsHereAndThereCostLittle) {
   const int whole = count(around, CellState::kFree);
   ASSERT_GT(whole, 20000);
   for (const double lost_ratio : {0.05, 0.3}) {
-    arena_.~Arena();
-    new (&arena_) core::Arena(block_);
-    BrickMap::Config config;
-    config.bounds_W = {Vector3(-30, -30, -3), Vector3(30, 30, 12)};
-    config.max_bricks = 2000;
-    config.max_image_width = config.max_image_height = kPixels;
-    sut_ = std::make_unique<BrickMap>(config, arena_);
+    begin();
     core::CounterRng rng(3);
     for (int n = 0; n < 2; ++n)
       see([&](auto& image) {
@@ -116,6 +116,78 @@ TEST_F(NoisyImages, HolesDoNotClearWhatWasSeen) {
       for (std::size_t i = 0; i < image.size() / 2; ++i) image[i] = kNan;
     });
   EXPECT_EQ(count(front, CellState::kOccupied), before);
+}
+
+/// What a product makes of sky: no value.
+constexpr DepthError kDarkSky{0.0, 0.0, 0.0, 0.0, false, true};
+void lose_sky(std::vector<float>& image) {
+  for (float& d : image)
+    if (std::isinf(d)) d = kNan;
+}
+
+TEST_F(NoisyImages, SkyWithoutValuesIsFreeWhereTheGroundIsSeenBelowIt) {
+  const Aabb ahead{Vector3(2.0, 4.05, 4.05), Vector3(9.0, 9.0, 8.0)};
+  see([](auto&) {});
+  const int whole = count(ahead, CellState::kFree);
+  ASSERT_GT(whole, 4000);
+  begin();
+  see(lose_sky, {0.0, 0.0});
+  EXPECT_LT(count(ahead, CellState::kFree), whole / 2)
+      << "of a camera that should have values there, it is a hole";
+  begin();
+  see(lose_sky, kDarkSky);
+  EXPECT_GT(count(ahead, CellState::kFree), 95 * whole / 100);
+}
+
+/// The pillar has no values, nor has the sky above it: it stands where the ground ends.
+TEST_F(NoisyImages, AWallWithoutTextureStandsWhereItsFootIs) {
+  for (int n = 0; n < 10; ++n)
+    see(
+        [this](auto& image) {
+          lose_sky(image);
+          if (&image != scene_.image.data()) return;
+          for (std::size_t v = 0; v < kPixels; ++v)
+            for (std::size_t u = 0; u < kPixels; ++u)
+              if (float& d = image[v * kPixels + u]; d > 7.89F && d < 7.91F) d = kNan;
+        },
+        kDarkSky);
+  EXPECT_EQ(count({Vector3(8.1, -1.65, 0.45), Vector3(11.9, 1.65, 11.0)}, CellState::kFree), 0);
+  EXPECT_GT(count({Vector3(4.05, -0.75, 4.35), Vector3(6.45, 0.75, 5.55)}, CellState::kFree), 100)
+      << "in front of it";
+}
+
+/// A room with a ceiling of no texture: its wall is seen over the horizon, and what is above that is not sky.
+TEST_F(NoisyImages, ACeilingWithoutTextureIsNoSky) {
+  scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)},
+                  {Vector3(15, -30, 0), Vector3(16, 30, 8)},
+                  {Vector3(-30, -30, 8), Vector3(30, 30, 9)}};
+  for (int n = 0; n < 10; ++n)
+    see(
+        [this](auto& image) {
+          lose_sky(image);
+          if (&image != scene_.image.data()) return;
+          for (std::size_t v = 0; v < kPixels; ++v)
+            for (std::size_t u = 0; u < kPixels; ++u) {
+              const double up = 1.0 - (static_cast<double>(v) + 0.5) * 2.0 / kPixels;
+              if (float& d = image[v * kPixels + u]; up > 0.0 && up * static_cast<double>(d) > 2.99) d = kNan;
+            }
+        },
+        kDarkSky);
+  EXPECT_EQ(count({Vector3(4.05, -3.0, 8.15), Vector3(14.0, 3.0, 8.9)}, CellState::kFree), 0);
+}
+
+/// A patch that the wall's values surround is as far as they are: free up to it, and nothing of the wall.
+TEST_F(NoisyImages, APatchWithoutTextureIsAsFarAsWhatIsAroundIt) {
+  for (int n = 0; n < 10; ++n)
+    see(
+        [this](auto& image) {
+          if (&image != scene_.image.data()) return;
+          for (std::size_t v = 26; v < 38; ++v)
+            for (std::size_t u = 26; u < 38; ++u) image[v * kPixels + u] = kNan;
+        },
+        kDarkSky);
+  EXPECT_GT(count({Vector3(4.05, -0.45, 4.65), Vector3(6.45, 0.45, 5.25)}, CellState::kFree), 70);
+  EXPECT_EQ(count({Vector3(8.1, -1.65, 1.05), Vector3(11.9, 1.65, 11.0)}, CellState::kFree), 0);
 }
 
 /// Pixels at the edge of the pillar end between it and what is behind, each scan elsewhere.
