@@ -15,19 +15,23 @@ namespace roborun {
 
 enum class CameraModel : std::uint8_t { kClean, kD435, kD455, kOakD, kTof };
 enum class LidarModel : std::uint8_t { kClean, kMid360, kRing };
-enum class GnssModel : std::uint8_t { kClean, kM9n };
+/// kNone: it has no receiver.
+enum class GnssModel : std::uint8_t { kClean, kM9n, kNone };
 enum class ImuModel : std::uint8_t { kClean, kMems };
+enum class OdometryModel : std::uint8_t { kNone, kVio };
 
 /// In the order of the enumerators.
 inline constexpr std::array<const char*, 5> kCameraModels{"clean", "d435", "d455", "oak-d", "tof"};
 inline constexpr std::array<const char*, 3> kLidarModels{"clean", "mid360", "ring"};
-inline constexpr std::array<const char*, 2> kGnssModels{"clean", "m9n"};
+inline constexpr std::array<const char*, 3> kGnssModels{"clean", "m9n", "none"};
 inline constexpr std::array<const char*, 2> kImuModels{"clean", "mems"};
+inline constexpr std::array<const char*, 2> kOdometryModels{"none", "vio"};
 
 [[nodiscard]] constexpr const auto& names_of(CameraModel) noexcept { return kCameraModels; }
 [[nodiscard]] constexpr const auto& names_of(LidarModel) noexcept { return kLidarModels; }
 [[nodiscard]] constexpr const auto& names_of(GnssModel) noexcept { return kGnssModels; }
 [[nodiscard]] constexpr const auto& names_of(ImuModel) noexcept { return kImuModels; }
+[[nodiscard]] constexpr const auto& names_of(OdometryModel) noexcept { return kOdometryModels; }
 
 template <class Model>
 [[nodiscard]] constexpr const char* to_string(Model model) noexcept {

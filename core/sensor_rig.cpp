@@ -194,6 +194,20 @@ double widest_blind_angle_rad(const SensorRig& rig) noexcept {
   return core::atan2(sine, least_cosine);
 }
 
+double too_near_m(const SensorRig& rig) noexcept {
+  double most_m = 0.0;
+  const auto add = [&most_m](const auto& sensors) {
+    for (const auto& sensor : sensors) {
+      const SensorMount& at = sensor.mount;
+      const double away_m = std::max({std::fabs(at.x_m), std::fabs(at.y_m), std::fabs(at.z_m)});
+      if (sensor.range_min_m > 0.0) most_m = std::max(most_m, sensor.range_min_m + away_m);
+    }
+  };
+  add(rig.cameras);
+  add(rig.lidars);
+  return most_m;
+}
+
 double shortest_range_m(const SensorRig& rig) noexcept {
   const auto shortest_m = [](const auto& sensors) {
     double range_m = sensors[0].range_m;

@@ -67,6 +67,7 @@ struct SensorRig {
   core::StaticVector<LidarSpec, kMostLidars> lidars{};
   ImuModel imu{};
   GnssModel gnss{};
+  OdometryModel odometry{};
 };
 
 /// One number of a sensor in a file.
@@ -213,6 +214,9 @@ struct RigFault {
 /// 180 degrees if nothing is seen. 16 million products in the worst case: for start-up.
 [[nodiscard]] double widest_blind_angle_rad(const SensorRig& rig) noexcept;
 
+/// Half of the cube around the vehicle's middle in which its sensors, all of them, may measure nothing because it is too
+/// near; 0: they measure from 0 m on.
+[[nodiscard]] double too_near_m(const SensorRig& rig) noexcept;
 /// The shortest range of the cameras, of the LiDARs where there is no camera; 0 without sensors.
 [[nodiscard]] double shortest_range_m(const SensorRig& rig) noexcept;
 /// Pixels a side of the images that its cloud becomes, 90 degrees each: each pixel is met by a ray.

@@ -25,7 +25,7 @@ enum class Condition : std::uint8_t {
   kBatteryLow,
   kBatteryCritical,
   kFence,         ///< Outside of the permitted space.
-  kGnss,          ///< No usable fix.
+  kGnss,          ///< No usable fix, and no odometry.
   kDepth,         ///< No usable depth image.
   kCanTelemetry,  ///< A motor's controller is silent, or the bus is gone.
   kLink,          ///< No operator.

@@ -73,7 +73,7 @@ int config(bool json) {
       "keep_in and keep_out = [{{ polygon = [[x, y], ...] }}, {{ circle = [x, y, radius] }}]; the models of "
       "all sensors "
       "of a kind,\n"
-      "as below: [camera], [lidar], [imu] and [gnss] model = NAME.\n\n",
+      "as below: [camera], [lidar], [imu], [gnss] and [odometry] model = NAME.\n\n",
       input::reference_of(settings));
   fmt::print(
       "# Vehicles: --vehicle FILE. No key may be left out; the numbers shown as defaults are those of "
@@ -85,9 +85,10 @@ int config(bool json) {
       "simulator gives a "
       "sensor:\n"
       "model = NAME, default clean; [[camera]] {}, with invalid_ratio from 0 to {:g} (default {:g});\n"
-      "[[lidar]] {}; [imu] {}; [gnss] {}.\n",
+      "[[lidar]] {}; [imu] {}; [gnss] {}; [odometry] {} (default none).\n",
       input::reference_of(vehicle), fmt::join(kCameraModels, ", "), kMostInvalid, CameraSpec{}.invalid_ratio,
-      fmt::join(kLidarModels, ", "), fmt::join(kImuModels, ", "), fmt::join(kGnssModels, ", "));
+      fmt::join(kLidarModels, ", "), fmt::join(kImuModels, ", "), fmt::join(kGnssModels, ", "),
+      fmt::join(kOdometryModels, ", "));
   fmt::print(
       "\n# Worlds: --world FILE.toml (or an OctoMap .bt, .ot: every leaf that it calls occupied is solid; "
       "without "

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "platform/app/exit_code.hpp"
+#include "platform/app/map_build_command.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/output_file.hpp"
@@ -172,8 +173,8 @@ int view(const MapOptions& options) {
 
 void add_map_command(CLI::App& app, std::function<int()>& run) {
   auto options = std::make_shared<MapOptions>();
-  CLI::App* map =
-      app.add_subcommand("map", "look into OctoMap files (.bt, .ot), convert, compare and draw them");
+  CLI::App* map = app.add_subcommand(
+      "map", "look into OctoMap files (.bt, .ot), convert, compare and draw them; make them from recordings");
   map->require_subcommand(1);
   const auto add = [&](const char* name, const char* what, int (*command)(const MapOptions&)) {
     CLI::App* sub = map->add_subcommand(name, what);
@@ -197,6 +198,7 @@ void add_map_command(CLI::App& app, std::function<int()>& run) {
         options->height_m = input::number_of("--height", text, -20e3, 20e3);
       },
       "of the level cut, metres; default: the middle");
+  add_map_build_command(*map, run);
 }
 
 }  // namespace roborun::app

@@ -193,7 +193,7 @@ void add_scenario_command(CLI::App& app, std::function<int()>& run) {
       "  action = \"land\"                 # go_on hold return land terminate kill: the last one\n"
       "  condition = \"gnss\"              # that held when an action was decided\n"
       "  within_s = 1.5                  # from the first fault to the first action\n"
-      "  touchdown_mps = 1.5             # motors_stop_within_s, home_within_m, landing_site_known\n\n"
+      "  touchdown_mps = 1.5             # motors_stop_within_s, home_within_m, goal_within_m, landing_site_known\n\n"
       "Exit code: 0 all passed, 1 at least one failed (its line says why), 2 bad input.");
   run_app->add_option("path", options->path, "A scenario file, or a folder of them")->required();
   run_app->add_option("--junit", options->junit, "Write the verdicts to this file as JUnit XML");

@@ -57,8 +57,8 @@ Consequences consequences_of(const vehicle::Vehicle& vehicle) {
   describe_sensors(rig, config.flight);
   c.range_m = config.flight.camera_range_m;
   c.blind_deg = widest_blind_angle_rad(rig) * 180.0 / core::kPi;
-  c.assumed_half_m =
-      flight::assumed_free_half_m(v, config.flight.sees_all_around, config.flight.level_view_ratio);
+  c.assumed_half_m = flight::assumed_free_half_m(v, config.flight.sees_all_around,
+                                                 config.flight.level_view_ratio, config.flight.too_near_m);
   governor::GovernorConfig g;
   g.stopping = stop;
   constexpr double kThinking_s = 0.2;
@@ -80,6 +80,7 @@ std::vector<std::string> models_of(const SensorRig& rig) {
   for (const LidarSpec& lidar : rig.lidars) add("lidar", lidar.model);
   add("imu", rig.imu);
   add("gnss", rig.gnss);
+  if (rig.odometry != OdometryModel::kNone) add("odometry", rig.odometry);
   return names;
 }
 
@@ -94,11 +95,11 @@ std::vector<std::string> shortcomings_of(const vehicle::Vehicle& vehicle, const 
     lines.push_back(
         fmt::format("has little thrust for wind: thrust-to-weight {:.2f}", c.thrust_to_weight_ratio));
   if (!c.assumed_half_m.isZero(0.0))
-    lines.push_back(
-        fmt::format("cannot see all around: take off where {:.1f} m to all sides and {:.1f} m above and "
-                    "below the top of the climb are "
-                    "free",
-                    c.assumed_half_m.x(), c.assumed_half_m.z()));
+    lines.push_back(fmt::format(
+        "cannot see all around, or not nearby: take off where {:.1f} m to all sides and {:.1f} m above and "
+        "below the top of the climb are "
+        "free",
+        c.assumed_half_m.x(), c.assumed_half_m.z()));
   lines.push_back(fmt::format("cannot pass gaps narrower than {:.2f} m", c.gap_m));
   return lines;
 }

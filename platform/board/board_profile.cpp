@@ -19,6 +19,7 @@
 #include "platform/sitl/sensors/depth_camera.hpp"
 #include "platform/sitl/world/generator.hpp"
 #include "stages/perception/point_cloud.hpp"
+#include "stages/perception/space_profiler.hpp"
 #include "stages/planning/smoother.hpp"
 
 namespace roborun::board {
@@ -112,8 +113,9 @@ class Sweeper {
     stages::IntegrationResult integrated;
     (void)backends.map->integrate({scans_[at].frames(), level, 1e9, before}, unlimited, integrated);
     const auto frames = scans_[at + 1].frames();
-    add_units(core::StageId::kPointCloud, timed([&] { (void)cloud.step(frames, level, unlimited, work); }),
-              work);
+    const stages::CloudNeed need = stages::needed_points({}, here[0], world_.bounds_W());
+    add_units(core::StageId::kPointCloud,
+              timed([&] { (void)cloud.step(frames, level, need, unlimited, work); }), work);
 
     const double share = static_cast<double>(eighth) / kVolumes;
     const double seen_m3 = cloud.seen_volume_m3();

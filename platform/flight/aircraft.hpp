@@ -5,6 +5,7 @@
 #include "firmware_if/gnss.hpp"
 #include "firmware_if/imu.hpp"
 #include "firmware_if/motors.hpp"
+#include "firmware_if/odometry.hpp"
 #include "firmware_if/time.hpp"
 
 namespace roborun::flight {
@@ -29,6 +30,8 @@ class Aircraft {
   [[nodiscard]] virtual firmware_if::Imu& imu() noexcept = 0;
   [[nodiscard]] virtual firmware_if::Gnss& gnss() noexcept = 0;
   [[nodiscard]] virtual firmware_if::Barometer& barometer() noexcept = 0;
+  /// Null: it has none.
+  [[nodiscard]] virtual firmware_if::Odometry* odometry() noexcept { return nullptr; }
   [[nodiscard]] virtual firmware_if::Motors& motors() noexcept = 0;
   [[nodiscard]] virtual AircraftHealth health(MonotonicTime now) noexcept = 0;
   /// Motors off for good, whatever is commanded from here on: by the runtime itself, and after a landing.

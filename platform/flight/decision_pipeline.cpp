@@ -7,6 +7,7 @@
 #include "platform/flight/flight_config.hpp"
 #include "stages/perception/polled_view.hpp"
 #include "stages/planning/fenced_view.hpp"
+#include "stages/planning/way_out.hpp"
 
 namespace roborun::flight {
 namespace {
@@ -15,6 +16,7 @@ constexpr double kTrajectoryStep_s = 0.5;  // of the points that order the space
 constexpr std::size_t kTrajectoryPoints = 32;
 constexpr double kCornerRoom_m = 0.25;
 constexpr double kAtRest_mps = 0.05;
+constexpr double kLeaving_mps = 0.5;
 constexpr double kTooFast = 1.5;
 constexpr double kSlowEnough = 1.05;  // of the slow speed: what trajectories keep to
 /// What the way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
@@ -22,16 +24,36 @@ constexpr double kBeyond_mps = 2.0;
 
 }  // namespace
 
-Vector3 assumed_free_half_m(const VehicleModel& vehicle, bool sees_all_around,
-                            double level_view_ratio) noexcept {
+Vector3 assumed_free_half_m(const VehicleModel& vehicle, bool sees_all_around, double level_view_ratio,
+                            double too_near_m) noexcept {
   constexpr double kMost_m = 5.0;
-  if (sees_all_around) return Vector3::Zero();
+  if (sees_all_around && too_near_m == 0.0) return Vector3::Zero();
   // What has to be free around the start of a plan, and as far as the sensors see less of it than that while the
   // vehicle turns: at a distance of d they see d * ratio up and down.
-  const double half_m = planned_radius_m(vehicle) + kCornerRoom_m + kPublishedCell_m;
+  const double room_m = planned_radius_m(vehicle) + kCornerRoom_m + kPublishedCell_m;
+  const double half_m = std::max(room_m, std::min(too_near_m + kPublishedCell_m, kMost_m));
+  if (sees_all_around) return Vector3::Constant(half_m);
   const double reach_m = std::min((half_m + kPublishedCell_m) / level_view_ratio + kPublishedCell_m, kMost_m);
   return {std::max(reach_m, half_m), std::max(reach_m, half_m), half_m};
 }
+
+class DecisionPipeline::Known {
+ public:
+  Known(const DecisionPipeline& p, const DecisionInput& in) noexcept
+      : fenced_(p.map_.view(), p.config_.fence),
+        finest_(p.config_.fence.empty() ? p.map_.view() : fenced_),
+        standing_(finest_, Aabb::around(in.committed->at(in.now).p_W, p.config_.vehicle.radius_m)),
+        leaves_(in.committed->start_time == p.leaves_at_) {}
+  [[nodiscard]] const stages::MapView& view() const noexcept {
+    return leaves_ ? static_cast<const stages::MapView&>(standing_) : finest_;
+  }
+
+ private:
+  stages::FencedView fenced_;
+  stages::FinestView finest_;
+  stages::StandingView standing_;
+  bool leaves_;
+};
 
 DecisionPipeline::DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter,
                                    governor::DecisionPolicy& policy, stages::PointCloud& cloud,
@@ -69,15 +91,18 @@ core::MeteredBudget DecisionPipeline::table_budget_of(core::StageId id) noexcept
 void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) noexcept {
   core::MeteredBudget budget = table_budget_of(core::StageId::kPointCloud);
   core::Work work;
-  (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), budget, work);
   const double r_m = radius_m();
   const Aabb relevant_W{config_.flight_bounds_W.min_W - Vector3::Constant(r_m),
                         config_.flight_bounds_W.max_W + Vector3::Constant(r_m)};
+  const stages::SpaceProfilerConfig profiler{.vehicle_width_m = 2.0 * config_.vehicle.radius_m};
+  stages::CloudNeed need = stages::needed_points(profiler, in.p_WB, relevant_W);
+  need.reach_m = std::fmax(need.reach_m, MotionWatch::kReach_m);
+  (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), need, budget, work);
   motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W}, cloud_.points(), map_.view(), budget, work);
   out.motion = motion_.moving(in.now);
-  (void)profile_space({.vehicle_width_m = 2.0 * config_.vehicle.radius_m}, cloud_.points(), map_.view(),
-                      *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W, relevant_W,
-                      is_narrow_ ? slow_radius_m(config_.vehicle) : r_m, out.profile, budget, work);
+  (void)profile_space(profiler, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB,
+                      in.goal_W, relevant_W, is_narrow_ ? slow_radius_m(config_.vehicle) : r_m, out.profile,
+                      budget, work);
   out.profile.sensor_volume_m3 = cloud_.seen_volume_m3();
   // What the map will hold once this decision's images are in it.
   out.profile.map_volume_m3 = map_.known_volume_m3() + cloud_.seen_volume_m3();
@@ -96,7 +121,8 @@ Vector3 DecisionPipeline::assumed_half_m(const DecisionInput& in) const noexcept
   // the vehicle hovers where the climb ended.
   const bool hovers = in.now >= climbed && (in.climbing || !has_planned_);
   if (!hovers) return Vector3::Zero();
-  return assumed_free_half_m(config_.vehicle, config_.sees_all_around, config_.level_view_ratio);
+  return assumed_free_half_m(config_.vehicle, config_.sees_all_around, config_.level_view_ratio,
+                             config_.too_near_m);
 }
 
 void DecisionPipeline::integrate(const DecisionInput& in, DecisionOutput& out) noexcept {
@@ -135,12 +161,11 @@ void DecisionPipeline::integrate(const DecisionInput& in, DecisionOutput& out) n
 
 void DecisionPipeline::check_committed(const DecisionInput& in, DecisionOutput& out) noexcept {
   if (in.climbing) return;  // through space that is not known yet
-  const stages::FencedView fenced(map_.view(), config_.fence);
-  const stages::FinestView known(config_.fence.empty() ? map_.view() : fenced);
+  const Known known(*this, in);
   meter_.charge_to(core::StageId::kPlanner);
   core::MeteredBudget budget = budget_of(core::StageId::kPlanner, out);
   core::Work& work = out.work[core::StageId::kPlanner];
-  const stages::PolledView polled(known, budget, work);
+  const stages::PolledView polled(known.view(), budget, work);
   const double from_s = seconds(in.now - in.committed->start_time);
   const double until_s = free_until_s(polled, *in.committed, from_s, config_.vehicle.radius_m, work.units);
   // Where something moves, what is fast now is not flown on until a slower plan is there.
@@ -148,7 +173,7 @@ void DecisionPipeline::check_committed(const DecisionInput& in, DecisionOutput& 
   if (std::isinf(until_s) && !too_fast) return;
   const MonotonicTime free_until =
       std::isinf(until_s) ? MonotonicTime::max() : in.committed->start_time + from_seconds(until_s);
-  out.early_stop = stop_before(in, free_until, known, work, out.latency);
+  out.early_stop = stop_before(in, free_until, known.view(), work, out.latency);
 }
 
 std::optional<Trajectory> DecisionPipeline::stop_before(const DecisionInput& in, MonotonicTime free_until,
@@ -204,12 +229,30 @@ void DecisionPipeline::fit(core::StageBudget& budget, double radius_m, double sp
   request.start = draft_.start;
   request.start_time = draft_.takes_over;
   request.limits = limits(speed_mps);
-  request.radius_m = out.planner_status == Status::kStartBlocked ? config_.vehicle.radius_m : radius_m;
+  request.radius_m = radius_m;
   meter_.charge_to(core::StageId::kSmoother);
   stages::SmoothResult smoothed;
   out.smoother_status = smoother_.smooth(request, view, budget, smoothed);
   draft_.smoother_work.units += smoothed.work.units;
   if (out.smoother_status == Status::kOk) draft_.trajectory = smoothed.trajectory;
+}
+
+void DecisionPipeline::leave(core::StageBudget& budget, DecisionOutput& out) noexcept {
+  // What is flown ends in a stop: from there.
+  if (draft_.start.v_W.norm() > kAtRest_mps || draft_.start.a_W.norm() > kAtRest_mps) return;
+  const stages::FencedView fenced(map_.view(), config_.fence);
+  const stages::MapView& view = config_.fence.empty() ? map_.view() : fenced;
+  stages::WayOutRequest request;
+  request.start_W = draft_.start.p_W;
+  request.start_time = draft_.takes_over;
+  request.bounds_W = config_.flight_bounds_W;
+  request.limits = limits(std::min(out.decision.point.speed_limit_mps, kLeaving_mps));
+  request.body_m = config_.vehicle.radius_m;
+  request.room_m = radius_m();
+  meter_.charge_to(core::StageId::kSmoother);
+  draft_.leaves = stages::find_way_out(request, view, stages::FinestView(view), budget, draft_.smoother_work,
+                                       draft_.trajectory);
+  out.smoother_status = draft_.leaves ? Status::kOk : Status::kNoPath;
 }
 
 void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexcept {
@@ -221,11 +264,11 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   draft_.start = in.committed->at(draft_.takes_over);
   draft_.planner_work = out.work[core::StageId::kPlanner];
   draft_.smoother_work = {};
-  draft_.is_narrow = false;
-  const stages::FencedView fenced(map_.view(), config_.fence);
-  const stages::FinestView known(config_.fence.empty() ? map_.view() : fenced);
-  draft_.committed_until_s = free_until_s(known, *in.committed, seconds(in.now - in.committed->start_time),
-                                          config_.vehicle.radius_m, draft_.planner_work.units);
+  draft_.leaves = draft_.is_narrow = false;
+  const Known known(*this, in);
+  draft_.committed_until_s =
+      free_until_s(known.view(), *in.committed, seconds(in.now - in.committed->start_time),
+                   config_.vehicle.radius_m, draft_.planner_work.units);
   draft_.planner_work.level = out.decision.point.p1_level;
   draft_.planner_budget.emplace(budget_of(core::StageId::kPlanner, out));
   remember(in, out);
@@ -274,6 +317,7 @@ bool DecisionPipeline::may_squeeze() const noexcept {
 
 void DecisionPipeline::fit_narrow(core::StageBudget& budget, DecisionOutput& out) noexcept {
   const VehicleModel& vehicle = config_.vehicle;
+  if (out.planner_status == Status::kStartBlocked) return leave(budget, out);
   fit(budget, slow_radius_m(vehicle), std::min(out.decision.point.speed_limit_mps, vehicle.slow_speed_mps),
       out);
   draft_.is_narrow = out.smoother_status == Status::kOk;
@@ -293,7 +337,10 @@ void DecisionPipeline::find_trajectory(const DecisionInput& in, core::StageBudge
   }
   if (is_found()) return;
   search(in, radius_m(), out);
-  if (out.planner_status != Status::kStartBlocked || !may_be_narrow) fit(budget, radius_m(), speed_mps, out);
+  if (out.planner_status != Status::kStartBlocked)
+    fit(budget, radius_m(), speed_mps, out);
+  else if (!may_be_narrow)
+    leave(budget, out);
   if (is_found() || was_narrow || !may_be_narrow) return;
   search(in, slow_radius_m(config_.vehicle), out);
   fit_narrow(budget, out);
@@ -311,18 +358,26 @@ void DecisionPipeline::choose(const DecisionInput& in, DecisionOutput& out) noex
   if (has_new && !keeps) {
     has_planned_ = true;
     is_narrow_ = draft_.is_narrow;
+    if (draft_.leaves) leaves_at_ = draft_.trajectory.start_time;
     out.kind = DecisionKind::kNew;
     out.trajectory = draft_.trajectory;
     return;
   }
   if (is_free || in.climbing) return;
-  const stages::FencedView fenced(map_.view(), config_.fence);
-  const stages::FinestView known(config_.fence.empty() ? map_.view() : fenced);
+  const Known known(*this, in);
   const MonotonicTime free_until = in.committed->start_time + from_seconds(draft_.committed_until_s);
-  const auto stop = stop_before(in, free_until, known, draft_.smoother_work, out.latency);
+  const auto stop = stop_before(in, free_until, known.view(), draft_.smoother_work, out.latency);
   if (!stop) return;
   out.kind = DecisionKind::kBrake;
   out.trajectory = *stop;
+}
+
+void DecisionPipeline::forget() noexcept {
+  map_.forget();
+  if (ways_ != nullptr) ways_->forget();
+  motion_ = {};
+  kept_W_.clear();
+  has_planned_ = false;
 }
 
 void DecisionPipeline::run(core::StageId id, const DecisionInput& in, DecisionOutput& out) noexcept {

@@ -34,6 +34,7 @@ struct PipelineConfig {
   /// The sensors together see every direction; false: what they do not see may be anything.
   bool sees_all_around{true};
   double level_view_ratio{1.0};  ///< FlightConfig::level_view_ratio.
+  double too_near_m{};           ///< FlightConfig::too_near_m.
   PrecisionLattice lattice{};
   double horizon_m{24.0};  ///< No way-point farther than this: one metre less than the cameras see.
   core::Fence fence{};     ///< What it forbids is occupied for planner and smoother.
@@ -95,6 +96,9 @@ class DecisionPipeline {
   /// more, as tight as the vehicle can fly; that time is the planner's.
   /// RT-safe: no allocation; bounded by the stages' budgets.
   void run(core::StageId id, const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// Nothing is known any more: what was seen lies elsewhere. To be called between decisions. What is flown is then not free, so
+  /// that the next one brakes; hovering, the vehicle takes as much to be free around itself as at the top of its climb.
+  void forget() noexcept;
   /// Of the map, as the planner sees it but for the fence.
   [[nodiscard]] const stages::MapView& view() const noexcept { return map_.view(); }
   [[nodiscard]] const stages::OccupancyMap& map() const noexcept { return map_; }
@@ -107,6 +111,9 @@ class DecisionPipeline {
     const VehicleModel& v = config_.vehicle;
     return {speed_mps, v.acceleration_mps2, v.jerk_mps3, v.climb_mps, v.descent_mps};
   }
+  /// The map at its finest, with the fence around it: what is flown is checked in it. While the vehicle leaves a place
+  /// without room, the box where it is does not hold it.
+  class Known;
   /// What the planner's slot leaves to the smoother's.
   struct Draft {
     bool begun{};  ///< False: nothing is planned in this decision.
@@ -117,6 +124,7 @@ class DecisionPipeline {
     core::Work planner_work{}, smoother_work{};
     Trajectory trajectory{};
     bool is_narrow{};  ///< With the room of slow flight.
+    bool leaves{};     ///< The trajectory leaves a place without room.
   };
 
   void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
@@ -149,6 +157,8 @@ class DecisionPipeline {
   void fit_narrow(core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// From the search of plan() on, with less and less room.
   void find_trajectory(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
+  /// From rest, out of where no search has room: slowly, with the vehicle's own radius.
+  void leave(core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// Between the new trajectory, what is flown, and a stop.
   void choose(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// What is left of the deadline for this stage, when the stages after it get what was predicted for them.
@@ -168,6 +178,8 @@ class DecisionPipeline {
   stages::Path kept_W_;      ///< What was planned last.
   MotionWatch motion_;
   bool has_planned_{false};  ///< A plan was found since the take-off.
+  MonotonicTime leaves_at_ =
+      MonotonicTime::min();  ///< Start of the last trajectory that leaves a place without room.
   Draft draft_;
   bool is_narrow_{false};  ///< What is flown was planned so.
   int failures_{0};        ///< Decisions in a row without a trajectory.

@@ -98,6 +98,21 @@ void DecisionProgram::look_through_lidar(std::size_t lidar, const stages::PastSt
   }
 }
 
+DepthError place_error(const stages::EstimatedState& state) noexcept {
+  return {.constant_m = 0.0,
+          .quadratic_per_m = 0.0,
+          .place_m = std::max(state.map_sigma_m - kSureWithin_m, 0.0),
+          .angle_rad = std::max(state.map_sigma_rad - kSureWithin_rad, 0.0) + state.drift_ratio};
+}
+
+void DecisionProgram::blur(const stages::EstimatedState& state) noexcept {
+  const DepthError more = place_error(state);
+  for (stages::PosedDepthFrame& posed : frames_) {
+    posed.error.place_m += more.place_m;
+    posed.error.angle_rad += more.angle_rad;
+  }
+}
+
 void DecisionProgram::look(const stages::PastStates& past, bool airborne, MonotonicTime now) noexcept {
   frames_.clear();
   look_through_cameras(past);
@@ -138,7 +153,12 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
     lane.end_frame();
     return;
   }
+  if (state.map_number != map_number_) {
+    pipeline_.forget();
+    map_number_ = state.map_number;
+  }
   look(report.past, report.airborne, lane.release());
+  blur(state);
   publish(lane.release() + kIdlePeriod);
   if (frames_.empty()) {
     lane.set_period(4 * core::kMinorFrame);
@@ -153,7 +173,7 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
   in_.v_WB = state.v_WB;
   in_.goal_W = report.action == Action::kReturn ? report.home_W
                : report.action == Action::kLand ? state.p_WB  // close looks, slow
-                                                : config_.goal_W;
+                                                : Vector3(config_.goal_W - state.shift_W);
   in_.seed = core::mix64(config_.seed * 1000003ULL + ++decisions_);
 }
 

@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 
+#include "core/depth_error.hpp"
 #include "core/executive/frame_table.hpp"
 #include "core/executive/lane_executive.hpp"
 #include "core/geometry/fence.hpp"
@@ -19,6 +20,17 @@
 #include "stages/perception/cloud_images.hpp"
 
 namespace roborun::flight {
+
+/// What the estimate adds to the error of an image (DepthError), as far as it matters against the map: never the error on the
+/// earth, which moves map and vehicle alike.
+///  - place_m, angle_rad: what the filter says of its state against what was mapped a moment ago. The first kSureWithin_m and
+///    kSureWithin_rad of it are in the margins already: those were chosen with a fix of centimetres.
+///  - angle_rad: the drift per metre. What is z metres away is passed z metres of flight later at the soonest, and has moved
+///    against the vehicle by drift_ratio z then: as an error of direction. What is older than that was left behind, and is
+///    looked at again, with fresh images, before it is flown through.
+[[nodiscard]] DepthError place_error(const stages::EstimatedState& state) noexcept;
+inline constexpr double kSureWithin_m = 0.06;
+inline constexpr double kSureWithin_rad = 0.025;
 
 class DecisionProgram final : public core::LaneProgram {
  public:
@@ -54,6 +66,8 @@ class DecisionProgram final : public core::LaneProgram {
   void look_through_cameras(const stages::PastStates& past) noexcept;
   void look_through_lidar(std::size_t lidar, const stages::PastStates& past) noexcept;
   void publish(MonotonicTime due) noexcept;
+  /// The estimate's share of what the map keeps away from what it saw: see place_error().
+  void blur(const stages::EstimatedState& state) noexcept;
   void choose_site() noexcept;
   void judge() noexcept;
   /// False if it is too late for it.
@@ -81,6 +95,7 @@ class DecisionProgram final : public core::LaneProgram {
   stages::FrameGuard guard_{};
   std::array<MonotonicTime, kMostCameras + kMostLidars> last_usable_{};  ///< By sensor.
   std::uint64_t refusals_before_{0};
+  std::uint32_t map_number_{0};  ///< EstimatedState::map_number of what is in the map.
 };
 
 }  // namespace roborun::flight

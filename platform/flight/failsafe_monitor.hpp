@@ -12,7 +12,7 @@ namespace roborun::flight {
 struct FailsafeMeasures {
   double battery_used_ratio{};  ///< NaN: the battery's monitor says nothing usable.
   double outside_fence{};       ///< 1 if the estimated position is not permitted.
-  double gnss_age_s{};      ///< Of the newest fix that the filter took and that differs from the one before.
+  double position_age_s{};  ///< Of the newest fix, or odometry, that the filter took and that differs from the one before.
   double depth_age_s{};     ///< Of the newest usable image of the camera that is worst off.
   double esc_silence_s{};   ///< Of the ESC that is worst off.
   double link_silence_s{};  ///< Since the operator was last heard.
@@ -39,7 +39,7 @@ inline constexpr std::array<FailsafeThreshold, 13> kFailsafeThresholds = [] {
     {C::kBatteryLow,      &M::battery_used_ratio, 0.75, 1.0},   // the way home plus a reserve of 10 %; lost counts as low
     {C::kBatteryCritical, &M::battery_used_ratio, 0.90, 1.0},   // 3 min of hovering: a landing takes 20 s
     {C::kFence,           &M::outside_fence,      0.5,  0.2},   // plans keep radius and tracking error away from it
-    {C::kGnss,            &M::gnss_age_s,         1.0,  0.0},   // ten fixes; inertial drift by then is below 0.2 m
+    {C::kGnss,            &M::position_age_s,     1.0,  0.0},   // ten fixes; inertial drift by then is below 0.2 m
     {C::kDepth,           &M::depth_age_s,        0.5,  0.5},   // ten images, and it stays so
     {C::kCanTelemetry,    &M::esc_silence_s,      0.5,  0.0},   // five of its status messages
     {C::kLink,            &M::link_silence_s,     2.0,  0.0},

@@ -32,7 +32,7 @@ FailsafeMeasures FailsafePilot::measure(MonotonicTime now, const DecisionReport&
   FailsafeMeasures m;
   const AircraftHealth health = aircraft_.health(now);
   m.battery_used_ratio = 1.0 - health.battery_ratio;
-  m.gnss_age_s = seconds(now - control_.last_fix());
+  m.position_age_s = seconds(now - control_.last_position());
   m.esc_silence_s = seconds(health.esc_silence);
   if (health.hears_operator) operator_heard_ = now;
   m.link_silence_s = seconds(now - operator_heard_);
@@ -52,8 +52,9 @@ FailsafeMeasures FailsafePilot::measure(MonotonicTime now, const DecisionReport&
         (state.p_WB - control_.reference().p_W).norm() / planned_radius_m(config_.vehicle);
   // Heights only between climb and descent: both go through the floor.
   const bool low = !control_.airborne() || control_.descending();
+  const Vector3 p_W = state.p_WB + state.shift_W;
   const bool inside =
-      low ? config_.fence.allows_over_ground({state.p_WB, state.p_WB}) : config_.fence.allows(state.p_WB);
+      low ? config_.fence.allows_over_ground({p_W, p_W}) : config_.fence.allows(p_W);
   m.outside_fence = inside ? 0.0 : 1.0;
   return m;
 }

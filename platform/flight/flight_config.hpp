@@ -36,6 +36,7 @@ struct FlightConfig {
   double camera_range_m{25.0};       ///< Of the cameras that the plans rely on. (1, 200]
   bool sees_all_around{true};        ///< The cameras together; false: what is not seen may be anything.
   double level_view_ratio{1.0};      ///< Tangent of the elevation, up and down, that one turn sees.
+  double too_near_m{};  ///< Half of the cube around the vehicle that may be too near for its sensors.
   GazeConfig gaze{};
   std::array<DepthError, kMostCameras>
       depth_error{};  ///< Of each camera: the map keeps this away from what it saw.
@@ -58,9 +59,9 @@ struct FlightConfig {
 void describe_sensors(const SensorRig& rig, FlightConfig& config) noexcept;
 
 /// Half the sides of the box around the top of the climb that counts as free although no sensor has seen it: what a
-/// vehicle whose sensors leave gaps needs to begin. Zero where they see all around. Whoever starts it sees to it that
-/// this much space is free there. `level_view_ratio` as of FlightConfig.
+/// vehicle needs to begin whose sensors leave gaps, or measure nothing nearby. Zero where they see all around from 0 m on.
+/// Whoever starts it sees to it that this much space is free there. The rest as of FlightConfig.
 [[nodiscard]] Vector3 assumed_free_half_m(const VehicleModel& vehicle, bool sees_all_around,
-                                          double level_view_ratio) noexcept;
+                                          double level_view_ratio, double too_near_m) noexcept;
 
 }  // namespace roborun::flight

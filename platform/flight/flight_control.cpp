@@ -41,7 +41,8 @@ bool is_plausible(const firmware_if::ImuSample& sample) {
 
 }  // namespace
 
-void FlightControl::sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_if::Barometer& barometer) {
+void FlightControl::sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_if::Barometer& barometer,
+                          firmware_if::Odometry* odometry) {
   // At most a ring's worth a frame, so that a flood of samples cannot hold the lane.
   constexpr int kMost = 16;
   firmware_if::ImuSample sample;
@@ -52,15 +53,23 @@ void FlightControl::sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmwa
     imu_ = sample;
     if (is_plausible(sample)) (void)estimator_.predict(sample);
   }
+  firmware_if::OdometrySample seen;
+  for (int i = 0; odometry != nullptr && i < kMost && odometry->read(seen) == Status::kOk; ++i) {
+    const bool differs = seen.p_OB_m != odometry_.p_OB_m || seen.v_OB_mps != odometry_.v_OB_mps;
+    odometry_ = seen;
+    if (estimator_.update(seen) == Status::kOk && differs) last_position_ = seen.stamp;
+  }
   firmware_if::GnssFix fix;
   for (int i = 0; i < kMost && gnss.read(fix) == Status::kOk; ++i) {
     const bool differs = fix.p_WB_m != fix_.p_WB_m || fix.v_WB_mps != fix_.v_WB_mps;
     fix_ = fix;
-    if (estimator_.update(fix) == Status::kOk && differs) last_fix_ = fix.stamp;
+    if (estimator_.update(fix) == Status::kOk && differs) last_position_ = std::max(last_position_, fix.stamp);
   }
   firmware_if::BarometerSample pressure;
   for (int i = 0; i < kMost && barometer.read(pressure) == Status::kOk; ++i)
     (void)estimator_.update(pressure);
+  stages::EstimatedState state;
+  if (estimator_.state(state) == Status::kOk) shift_W_ = state.shift_W;
 }
 
 void FlightControl::commit(MonotonicTime now) {
@@ -77,7 +86,7 @@ void FlightControl::commit(MonotonicTime now) {
     committed_ = take_off(state.p_WB, cruise_m_, std::min(kTakeOff_mps, vehicle_.climb_mps), now);
     ++committed_number_;
     flying_ = true;
-    home_W_ = committed_.end_W();
+    home_W_ = committed_.end_W() + state.shift_W;
     ground_m_ = state.p_WB.z();
   }
   if (!airborne_ && now > committed_.start_time + from_seconds(committed_.duration_s()) + kHover &&

@@ -10,6 +10,7 @@
 #include "firmware_if/gnss.hpp"
 #include "firmware_if/imu.hpp"
 #include "firmware_if/motors.hpp"
+#include "firmware_if/odometry.hpp"
 #include "platform/flight/gaze.hpp"
 #include "stages/control/estimator.hpp"
 #include "stages/control/tracker.hpp"
@@ -34,7 +35,8 @@ class FlightControl {
   void offer(const Trajectory& trajectory) { offered_ = trajectory; }
   /// The three steps of a minor frame, in this order. RT-safe: O(1), no allocation.
   /// Reads all sensors, at most a ring's worth each, and estimates.
-  void sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_if::Barometer& barometer);
+  void sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_if::Barometer& barometer,
+             firmware_if::Odometry* odometry = nullptr);
   /// Switches to an offered trajectory that is due.
   void commit(MonotonicTime now);
   /// Tracks the committed trajectory and commands the motors; nothing before the take-off.
@@ -68,12 +70,12 @@ class FlightControl {
   [[nodiscard]] bool landed() const { return landed_; }
 
   [[nodiscard]] bool flying() const { return flying_; }
-  /// Top of the climb. Precondition: flying().
-  [[nodiscard]] const Vector3& home_W() const { return home_W_; }
+  /// Top of the climb, where satellite navigation says by now that it is. Precondition: flying().
+  [[nodiscard]] Vector3 home_W() const { return home_W_ - shift_W_; }
   [[nodiscard]] double ground_m() const { return ground_m_; }
   [[nodiscard]] const TrajectoryPoint& reference() const { return reference_; }
-  /// Validity of the newest fix that the estimator took and that differs from the one before.
-  [[nodiscard]] MonotonicTime last_fix() const { return last_fix_; }
+  /// Validity of the newest fix or sample of the odometry that the estimator took and that differs from the one before.
+  [[nodiscard]] MonotonicTime last_position() const { return last_position_; }
   /// No IMU sample for 25 ms, or the same numbers 20 times: a living one is never without noise.
   [[nodiscard]] bool imu_lost(MonotonicTime now) const {
     return imu_repeats_ >= kMostRepeats || estimator_.imu_lost(now);
@@ -106,7 +108,9 @@ class FlightControl {
   firmware_if::ImuSample imu_{};
   int imu_repeats_{0};
   firmware_if::GnssFix fix_{};
-  MonotonicTime last_fix_{};
+  firmware_if::OdometrySample odometry_{};
+  MonotonicTime last_position_{};
+  Vector3 shift_W_ = Vector3::Zero();  ///< EstimatedState::shift_W.
 
   bool braking_{false};
   double brake_at_s_{0.0};  ///< Where on the committed trajectory.

@@ -20,7 +20,7 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
       aircraft_.begin_frame(now);
       return;
     case SlotId::kSense:
-      control_.sense(aircraft_.imu(), aircraft_.gnss(), aircraft_.barometer());
+      control_.sense(aircraft_.imu(), aircraft_.gnss(), aircraft_.barometer(), aircraft_.odometry());
       return;
     case SlotId::kCommit:
       (void)mail_.decision.take();

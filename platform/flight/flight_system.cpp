@@ -20,6 +20,7 @@ PipelineConfig pipeline_config(const FlightConfig& config) noexcept {
   pipeline.map_bounds_W = map_bounds_W(config);
   pipeline.level_view_ratio = config.level_view_ratio;
   pipeline.sees_all_around = config.sees_all_around;
+  pipeline.too_near_m = config.too_near_m;
   pipeline.horizon_m = config.camera_range_m - 1.0;
   pipeline.fence = config.fence;
   pipeline.lattice = lattice_of(config);
@@ -64,7 +65,7 @@ Status FlightConfig::validate() const noexcept {
   const bool space_ok = is_finite(bounds_W.min_W) && is_finite(bounds_W.max_W) &&
                         bounds_W.size().minCoeff() > 0.0 && is_finite(goal_W) && std::isfinite(cruise_m);
   const bool sensors_ok = core::above(camera_range_m, 1.0, 200.0) &&
-                          core::above(level_view_ratio, 0.0, 100.0) &&
+                          core::above(level_view_ratio, 0.0, 100.0) && core::within(too_near_m, 0.0, 100.0) &&
                           core::above(gaze.yaw_rate_radps, 0.0, 3.0) &&
                           core::above(gaze.stuck_s, 0.0, 1000.0) && core::within(gaze.lead_s, 0.0, 10.0);
   const bool ok = out_of_bounds(vehicle) == nullptr && rate_ok && space_ok && sensors_ok &&
@@ -106,6 +107,7 @@ void describe_sensors(const SensorRig& rig, FlightConfig& config) noexcept {
   config.camera_range_m = shortest_range_m(rig);
   config.sees_all_around = cameras_see_all_around(rig);
   config.level_view_ratio = level_view_ratio(rig);
+  config.too_near_m = too_near_m(rig);
   config.gaze.follows = !sees_horizon(rig);
   for (std::size_t i = 0; i < rig.cameras.size(); ++i)
     config.depth_error[i] = depth_error(rig.cameras[i].model);

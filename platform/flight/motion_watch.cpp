@@ -7,7 +7,6 @@
 namespace roborun::flight {
 namespace {
 
-constexpr double kReach_m = 15.0;     // farther away depth noise looks like motion
 constexpr double kAppeared_m = 0.15;  // around a point, known to be free: depth noise is less
 constexpr int kLeastPoints = 3;
 constexpr double kStanding_mps = 0.5;

@@ -17,6 +17,7 @@ namespace roborun::flight {
 /// RT-safe: O(points of the cloud), no allocation.
 class MotionWatch {
  public:
+  static constexpr double kReach_m = 15.0;  ///< Farther away depth noise looks like motion.
   static constexpr std::size_t kTraces = 64;
   using Places = core::StaticVector<Vector3, kTraces>;
 

@@ -51,6 +51,7 @@ void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle) {
   config.simulator.rig = vehicle.rig;
   config.simulator.sensors.imu = vehicle.rig.imu;
   config.simulator.sensors.gnss = vehicle.rig.gnss;
+  config.simulator.sensors.odometry = vehicle.rig.odometry;
   config.simulator.lidar_patterns.clear();
   for (std::size_t i = 0; i < vehicle.rig.lidars.size(); ++i) {
     auto& pattern = config.simulator.lidar_patterns.emplace_back();

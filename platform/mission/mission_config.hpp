@@ -46,6 +46,9 @@ struct SlowDown {
 
 /// When the judge ends a mission.
 struct JudgeConfig {
+  /// How far from the goal it has arrived. More than the default: and where it believes to be within the default, because no
+  /// navigation is better than its drift.
+  double goal_within_m{1.0};
   double time_limit_s{7200.0};
   double no_progress_s{
       120.0};  ///< Neither nearer to the goal nor far from where it was for so long: it is given up, hovering.

@@ -5,7 +5,6 @@
 namespace roborun::mission {
 namespace {
 
-constexpr double kReached_m = 1.0;
 constexpr double kReachedSpeed_mps = 0.5;
 constexpr double kHover_mps = 0.3;
 constexpr double kOwnApproach_mps = 0.3;  // less is swaying on the spot
@@ -53,6 +52,14 @@ const char* MissionJudge::failsafe_reason(MonotonicTime now) const {
   }
 }
 
+bool MissionJudge::believes_to_have_arrived() const {
+  const double believed_m = JudgeConfig{}.goal_within_m;
+  if (config_.goal_within_m <= believed_m) return true;
+  stages::EstimatedState state;
+  return system_.control().estimator().state(state) == Status::kOk &&
+         (state.p_WB + state.shift_W - world_.goal_W()).norm() < believed_m;
+}
+
 const char* MissionJudge::judge(MonotonicTime now) {
   const sitl::VehicleState& s = aircraft_.vehicle().state();
   const double to_goal_m = (world_.goal_W() - s.p_WB).norm();
@@ -80,7 +87,7 @@ const char* MissionJudge::judge(MonotonicTime now) {
     if (s.battery_ratio <= 0.0 && s.on_ground) return "battery_empty";
     return seconds(now.time_since_epoch()) > config_.time_limit_s ? "time_limit" : nullptr;
   }
-  if (to_goal_m < kReached_m && s.v_WB.norm() < kReachedSpeed_mps) {
+  if (to_goal_m < config_.goal_within_m && s.v_WB.norm() < kReachedSpeed_mps && believes_to_have_arrived()) {
     return "reached_goal";
   }
   if (to_goal_m < best_distance_m_ - 0.5 || (s.p_WB - moved_to_W_).norm() > kMoved_m) {

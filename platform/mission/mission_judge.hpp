@@ -34,6 +34,8 @@ class MissionJudge {
  private:
   void watch(MonotonicTime now);
   [[nodiscard]] const char* failsafe_reason(MonotonicTime now) const;
+  /// Or needs not to, because the judge asks for no less.
+  [[nodiscard]] bool believes_to_have_arrived() const;
 
   const JudgeConfig& config_;
   const core::Fence& fence_;

@@ -144,6 +144,8 @@ FlightRecorder::FlightRecorder(const std::string& path, const flight::FlightConf
   gnss_ = std::make_unique<Tap<firmware_if::Gnss, firmware_if::GnssFix>>(*this, aircraft.gnss());
   barometer_ = std::make_unique<Tap<firmware_if::Barometer, firmware_if::BarometerSample>>(
       *this, aircraft.barometer());
+  if (firmware_if::Odometry* odometry = aircraft.odometry())
+    odometry_ = std::make_unique<Tap<firmware_if::Odometry, firmware_if::OdometrySample>>(*this, *odometry);
   motors_ = std::make_unique<TappedMotors>(digest_, aircraft.motors());
   RecordedFlight recorded{flight, config.backends, config.slow_down, sitl::rig_of(config.simulator), {}, {}};
   for (firmware_if::DepthCamera* camera : cameras) {

@@ -34,9 +34,10 @@ enum class RecordKind : std::uint32_t {
   kDepth,
   kGiveUp,
   kEnd,
-  kLidar
+  kLidar,
+  kOdometry
 };
-inline constexpr std::size_t kRecordKinds = 10;
+inline constexpr std::size_t kRecordKinds = 11;
 
 /// What a flight did: every motor command, "motors off" and decision as they came, the map in the end.
 class FlightDigest {
@@ -84,6 +85,7 @@ class FlightRecorder final : private flight::Aircraft {
   [[nodiscard]] firmware_if::Imu& imu() noexcept override;
   [[nodiscard]] firmware_if::Gnss& gnss() noexcept override;
   [[nodiscard]] firmware_if::Barometer& barometer() noexcept override;
+  [[nodiscard]] firmware_if::Odometry* odometry() noexcept override { return odometry_.get(); }
   [[nodiscard]] firmware_if::Motors& motors() noexcept override;
   [[nodiscard]] flight::AircraftHealth health(MonotonicTime now) noexcept override;
   void terminate() noexcept override;
@@ -101,6 +103,7 @@ class FlightRecorder final : private flight::Aircraft {
   std::unique_ptr<firmware_if::Imu> imu_;
   std::unique_ptr<firmware_if::Gnss> gnss_;
   std::unique_ptr<firmware_if::Barometer> barometer_;
+  std::unique_ptr<firmware_if::Odometry> odometry_;  ///< Null: the aircraft has none.
   std::unique_ptr<firmware_if::Motors> motors_;
   std::vector<std::unique_ptr<firmware_if::DepthCamera>> camera_;
   std::vector<firmware_if::DepthCamera*> cameras_;

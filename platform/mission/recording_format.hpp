@@ -62,6 +62,16 @@ void each_field(F&& f, firmware_if::BarometerSample& s) {
   f(s.altitude_m);
 }
 template <typename F>
+void each_field(F&& f, firmware_if::OdometrySample& s) {
+  each_field(f, s.stamp);
+  f(s.sequence);
+  f(s.reset_counter);
+  for (double& x : s.p_OB_m) f(x);
+  for (double& x : s.q_OB) f(x);
+  for (double& x : s.v_OB_mps) f(x);
+  for (double* x : {&s.sigma_position_m, &s.sigma_attitude_rad, &s.sigma_speed_mps}) f(*x);
+}
+template <typename F>
 void each_field(F&& f, flight::AircraftHealth& s) {
   std::int64_t silence_ns = s.esc_silence.count();
   std::uint8_t hears_operator = s.hears_operator ? 1 : 0;
@@ -128,5 +138,6 @@ class Get {
 constexpr RecordKind kind_of(const firmware_if::ImuSample*) { return RecordKind::kImu; }
 constexpr RecordKind kind_of(const firmware_if::GnssFix*) { return RecordKind::kGnss; }
 constexpr RecordKind kind_of(const firmware_if::BarometerSample*) { return RecordKind::kBarometer; }
+constexpr RecordKind kind_of(const firmware_if::OdometrySample*) { return RecordKind::kOdometry; }
 
 }  // namespace roborun::mission

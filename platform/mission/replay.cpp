@@ -27,7 +27,8 @@ constexpr std::array<Size, kRecordKinds> kSizes{{{2, kMostStart},
                                                  {kDepthHead, kMostDepth},
                                                  {0, 0},
                                                  {24, 24},
-                                                 {kLidarHead, kMostLidar}}};
+                                                 {kLidarHead, kMostLidar},
+                                                 {117, 117}}};
 
 }  // namespace
 
@@ -164,7 +165,7 @@ class ReplayedLidar final : public firmware_if::Lidar {
 class ReplayedAircraft final : public flight::Aircraft, private firmware_if::Motors {
  public:
   ReplayedAircraft(Recording& recording, FlightDigest& digest)
-      : recording_(recording), digest_(digest), imu_(recording), gnss_(recording), barometer_(recording) {}
+      : recording_(recording), digest_(digest), imu_(recording), gnss_(recording), barometer_(recording), odometry_(recording) {}
   void begin_frame(MonotonicTime now) noexcept override {
     MonotonicTime recorded;
     each_field(Get(recording_.payload()), recorded);
@@ -174,6 +175,8 @@ class ReplayedAircraft final : public flight::Aircraft, private firmware_if::Mot
   [[nodiscard]] firmware_if::Imu& imu() noexcept override { return imu_; }
   [[nodiscard]] firmware_if::Gnss& gnss() noexcept override { return gnss_; }
   [[nodiscard]] firmware_if::Barometer& barometer() noexcept override { return barometer_; }
+  /// Where none was read, there is none to read.
+  [[nodiscard]] firmware_if::Odometry* odometry() noexcept override { return &odometry_; }
   [[nodiscard]] firmware_if::Motors& motors() noexcept override { return *this; }
   [[nodiscard]] flight::AircraftHealth health(MonotonicTime) noexcept override {
     flight::AircraftHealth health;
@@ -200,6 +203,7 @@ class ReplayedAircraft final : public flight::Aircraft, private firmware_if::Mot
   ReplayedSensor<firmware_if::Imu, firmware_if::ImuSample> imu_;
   ReplayedSensor<firmware_if::Gnss, firmware_if::GnssFix> gnss_;
   ReplayedSensor<firmware_if::Barometer, firmware_if::BarometerSample> barometer_;
+  ReplayedSensor<firmware_if::Odometry, firmware_if::OdometrySample> odometry_;
 };
 
 }  // namespace

@@ -161,7 +161,7 @@ void ScenarioReader::read_expectation(Scenario& s) const {
   const toml::table& t = table("expect");
   reader_.allow_keys(t, "[expect]",
                      {"outcome", "action", "condition", "within_s", "motors_stop_within_s", "touchdown_mps",
-                      "home_within_m", "landing_site_known"});
+                      "home_within_m", "goal_within_m", "landing_site_known"});
   s.expect.outcome = kOutcomes[choice(reader_.need(t, "outcome", "[expect]"), "outcome", kOutcomes)];
   if (const toml::node* node = t.get("action"))
     s.expect.action = governor::to_string(static_cast<governor::Action>(
@@ -177,6 +177,8 @@ void ScenarioReader::read_expectation(Scenario& s) const {
   }
   s.expect.touchdown_mps = maybe(t, "touchdown_mps", 100);
   s.expect.home_within_m = maybe(t, "home_within_m", 20000);
+  if (const toml::node* node = t.get("goal_within_m"))
+    s.config.judge.goal_within_m = number(*node, "goal_within_m", JudgeConfig{}.goal_within_m, 1000);
   if (const toml::node* node = t.get("landing_site_known"))
     s.expect.landing_site_known = truth(*node, "landing_site_known");
 }

@@ -87,10 +87,11 @@ constexpr std::array<SettingKey, 17> kSettings = [] {
 // clang-format on
 
 /// Keys that are no single number.
-constexpr std::array<std::pair<const char*, const char*>, 8> kOtherKeys{{{"camera", "model"},
+constexpr std::array<std::pair<const char*, const char*>, 9> kOtherKeys{{{"camera", "model"},
                                                                          {"lidar", "model"},
                                                                          {"imu", "model"},
                                                                          {"gnss", "model"},
+                                                                         {"odometry", "model"},
                                                                          {"wind", "mean_mps"},
                                                                          {"fence", "altitude_m"},
                                                                          {"fence", "keep_in"},
@@ -185,6 +186,8 @@ void read_models(const input::TomlReader& reader, const toml::table& root, Missi
   }
   if (const auto model = read_model<ImuModel>(reader, root, "imu")) simulator.sensors.imu = *model;
   if (const auto model = read_model<GnssModel>(reader, root, "gnss")) simulator.sensors.gnss = *model;
+  if (const auto model = read_model<OdometryModel>(reader, root, "odometry"))
+    simulator.sensors.odometry = *model;
 }
 
 /// Numbers that no sensor of this vehicle takes notice of.
@@ -192,6 +195,9 @@ void refuse_idle(const input::TomlReader& reader, const toml::table& root, const
   const SensorRig rig = sitl::rig_of(config.simulator);
   const auto clean_camera = [](const CameraSpec& c) { return c.model == CameraModel::kClean; };
   const auto clean_lidar = [](const LidarSpec& l) { return l.model == LidarModel::kClean; };
+  if (config.simulator.sensors.gnss == GnssModel::kNone &&
+      config.simulator.sensors.odometry == OdometryModel::kNone && root.get("gnss") != nullptr)
+    reader.refuse(*root.get("gnss"), "model", "must not be \"none\" without [odometry] model = \"vio\"");
   const auto refuse = [&](const char* table, const char* key, const char* what) {
     const toml::node* node = root.get(table);
     if (node == nullptr || node->as_table() == nullptr || node->as_table()->get(key) == nullptr) return;

@@ -12,12 +12,12 @@
 
 namespace roborun::mission {
 
-/// The numbers of settings_keys(); [camera], [lidar], [imu] and [gnss] model = NAME (core/sensor_model.hpp), for all of the vehicle; [wind] mean_mps = [x, y, z]; [fence] altitude_m = [low, high], keep_in and keep_out, arrays of { polygon = [[x, y], ...] } or { circle = [x, y, radius] }. What is
+/// The numbers of settings_keys(); [camera], [lidar], [imu], [gnss] and [odometry] model = NAME (core/sensor_model.hpp), for all of the vehicle; [wind] mean_mps = [x, y, z]; [fence] altitude_m = [low, high], keep_in and keep_out, arrays of { polygon = [[x, y], ...] } or { circle = [x, y, radius] }. What is
 /// not there keeps its default. Throws InputError with file, line, key and range.
 void load_settings(const std::string& path, MissionConfig& config);
 
 /// The same from a file that holds other tables too.
-inline const std::set<std::string_view> kSettingsTables{"camera",  "lidar",  "imu", "gnss", "wind", "rain",
+inline const std::set<std::string_view> kSettingsTables{"camera",  "lidar",  "imu", "gnss", "odometry", "wind", "rain",
                                                         "battery", "flight", "cpu", "fog",  "fence"};
 void read_settings(const input::TomlReader& reader, const toml::table& root, MissionConfig& config);
 /// Every number of a settings file.

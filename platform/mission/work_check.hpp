@@ -43,6 +43,7 @@ class TimedMap final : public stages::OccupancyMap {
                                  stages::IntegrationResult& result) noexcept override;
   [[nodiscard]] Status export_view(const stages::ExportRequest& request, core::StageBudget& budget,
                                    core::Work& work) noexcept override;
+  void forget() noexcept override { map_.forget(); }
   [[nodiscard]] const stages::MapView& view() const noexcept override { return map_.view(); }
   [[nodiscard]] double known_volume_m3() const noexcept override { return map_.known_volume_m3(); }
   [[nodiscard]] std::size_t bytes() const noexcept override { return map_.bytes(); }

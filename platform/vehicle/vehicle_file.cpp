@@ -32,7 +32,7 @@ bool is_mount(std::string_view key) {
 }
 
 std::set<std::string_view> tables() {
-  std::set<std::string_view> names{"vehicle", "stopping", "camera", "lidar", "imu", "gnss"};
+  std::set<std::string_view> names{"vehicle", "stopping", "camera", "lidar", "imu", "gnss", "odometry"};
   for (const VehicleKey& key : kVehicleKeys) names.insert(key.table);
   return names;
 }
@@ -80,6 +80,7 @@ class VehicleReader {
     read_sensors("lidar", vehicle.rig.lidars, &vehicle.patterns);
     read_model_of("imu", vehicle.rig.imu);
     read_model_of("gnss", vehicle.rig.gnss);
+    read_model_of("odometry", vehicle.rig.odometry);
     if (vehicle.rig.cameras.empty() && vehicle.rig.lidars.empty())
       reader_.refuse(root_, "camera", "missing: must have at least one [[camera]] or [[lidar]]");
     return vehicle;

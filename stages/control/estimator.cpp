@@ -13,6 +13,11 @@ constexpr int kVelocity = 3;
 constexpr int kAttitude = 6;
 constexpr int kGyroBias = 9;
 constexpr int kAccelBias = 12;
+constexpr double kBarometerGain = 0.01;  // at 50 Hz: over two seconds
+// Odometry is never trusted more: what it says wanders, and half of the corrections are still under way (its latency).
+constexpr double kLeastSigma_m = 0.02;
+constexpr double kLeastSigma_rad = 0.005;
+constexpr double kLeastSigma_mps = 0.05;
 
 Vector3 to_vector(const std::array<double, 3>& v) noexcept { return {v[0], v[1], v[2]}; }
 
@@ -33,6 +38,10 @@ Quaternion small_rotation(const Vector3& angle_rad) noexcept {
 
 bool has_heading(const firmware_if::GnssFix& fix) noexcept {
   return std::isfinite(fix.heading_rad) && fix.sigma_heading_rad > 0.0;
+}
+
+double largest_sigma_m(const firmware_if::GnssFix& fix) noexcept {
+  return std::fmax(fix.sigma_horizontal_m, fix.sigma_vertical_m);
 }
 
 double yaw_of(const Quaternion& q) noexcept {
@@ -66,6 +75,8 @@ Status Estimator::predict(const firmware_if::ImuSample& sample) noexcept {
   const Vector3 a_W = force_W_ - Vector3(0.0, 0.0, core::kGravity_mps2);
   state_.p_WB += dt_s * state_.v_WB + (0.5 * dt_s * dt_s) * a_W;
   state_.v_WB += dt_s * a_W;
+
+  if (anchor_) shift_.grow(config_.drift_ratio * dt_s * state_.v_WB.norm());
 
   covariance_dt_s_ += dt_s;
   if (++since_covariance_ >= kCovarianceEvery) {
@@ -120,17 +131,10 @@ bool Estimator::correct(int index, double innovation, double sigma) noexcept {
   return true;
 }
 
-void Estimator::start(const firmware_if::GnssFix& fix) noexcept {
-  state_.p_WB = to_vector(fix.p_WB_m);
-  state_.v_WB = to_vector(fix.v_WB_mps);
-  // Level by the accelerometer: the rotation that takes the measured force to the vertical, then the heading.
-  const double norm = last_force_B_.norm();
-  const Vector3 up_B = norm > 1.0 ? Vector3(last_force_B_ / norm) : Vector3(0.0, 0.0, 1.0);
-  const Vector3 axis = up_B.cross(Vector3(0.0, 0.0, 1.0));
-  const Quaternion level = Quaternion(1.0 + up_B.z(), axis.x(), axis.y(), axis.z()).normalized();
-  const double turn_rad = fix.heading_rad - yaw_of(level);
-  const core::SinCos half = core::sin_cos(0.5 * turn_rad);
-  state_.q_WB = (Quaternion(half.cos, 0.0, 0.0, half.sin) * level).normalized();
+void Estimator::begin_filter() noexcept {
+  anchor_.reset();
+  candidate_.reset();
+  fixes_agreed_ = false;
   gyro_bias_B_.setZero();
   accel_bias_B_.setZero();
   force_W_ = Vector3(0.0, 0.0, core::kGravity_mps2);
@@ -146,6 +150,30 @@ void Estimator::start(const firmware_if::GnssFix& fix) noexcept {
   since_covariance_ = 0;
   covariance_dt_s_ = 0.0;
   started_ = true;
+}
+
+void Estimator::start(const firmware_if::GnssFix& fix) noexcept {
+  state_.p_WB = to_vector(fix.p_WB_m);
+  state_.v_WB = to_vector(fix.v_WB_mps);
+  // Level by the accelerometer: the rotation that takes the measured force to the vertical, then the heading.
+  const double norm = last_force_B_.norm();
+  const Vector3 up_B = norm > 1.0 ? Vector3(last_force_B_ / norm) : Vector3(0.0, 0.0, 1.0);
+  const Vector3 axis = up_B.cross(Vector3(0.0, 0.0, 1.0));
+  const Quaternion level = Quaternion(1.0 + up_B.z(), axis.x(), axis.y(), axis.z()).normalized();
+  const double turn_rad = fix.heading_rad - yaw_of(level);
+  const core::SinCos half = core::sin_cos(0.5 * turn_rad);
+  state_.q_WB = (Quaternion(half.cos, 0.0, 0.0, half.sin) * level).normalized();
+  shift_.begin(largest_sigma_m(fix));
+  begin_filter();
+}
+
+void Estimator::start(const firmware_if::OdometrySample& sample, const OdometryState& in_O) noexcept {
+  state_.p_WB = in_O.p_m;
+  state_.v_WB = in_O.v_mps;
+  state_.q_WB = in_O.q;
+  shift_.begin(0.0);
+  odometry_stamp_ = sample.stamp;
+  begin_filter();
 }
 
 Status Estimator::update(const firmware_if::GnssFix& fix) noexcept {
@@ -169,7 +197,19 @@ Status Estimator::update(const firmware_if::GnssFix& fix) noexcept {
     return Status::kStale;
   }
   last_gnss_ = fix.stamp;
-  const bool accepted = correct_by(fix, p_W - then->p_WB, v_W - then->v_WB, yaw_of(then->q_WB));
+  const Vector3 dp_m = p_W - shift_.shift_W() - then->p_WB;
+  bool accepted = false;
+  if (follows_odometry(fix.stamp)) {
+    accepted = place_frame(fix, dp_m);
+  } else {
+    const double gate_m = config_.gate_sigma * core::hypot2(largest_sigma_m(fix), position_sigma_m());
+    accepted = correct_by(fix, dp_m, v_W - then->v_WB, yaw_of(then->q_WB));
+    // The vehicle did not jump with them: the inertial sensors of this second would have felt it.
+    fixes_agreed_ = fixes_agreed_ || accepted;
+    if (!accepted && fixes_agreed_ && dp_m.norm() > gate_m &&
+        shift_.refuse(dp_m, largest_sigma_m(fix), config_.gate_sigma, fix.stamp) == FrameShift::Verdict::kJumped)
+      ++counters_.jumps;
+  }
   if (accepted) ++counters_.gnss;
   reset_if_broken();
   return accepted ? Status::kOk : Status::kInvalidArgument;
@@ -203,17 +243,128 @@ Status Estimator::update(const firmware_if::BarometerSample& sample) noexcept {
     return Status::kStale;
   }
   last_barometer_ = sample.stamp;
-  if (!correct(kPosition + 2, sample.altitude_m - then->p_WB.z(), config_.barometer_sigma_m))
+  const double dz_m = sample.altitude_m - barometer_shift_m_ - then->p_WB.z();
+  if (follows_odometry(sample.stamp)) {
+    barometer_shift_m_ += kBarometerGain * dz_m;
+    ++counters_.barometer;
+    return Status::kOk;
+  }
+  if (!correct(kPosition + 2, dz_m, config_.barometer_sigma_m))
     return Status::kInvalidArgument;
   ++counters_.barometer;
   reset_if_broken();
   return Status::kOk;
 }
 
+Estimator::Innovation Estimator::innovation_of(const firmware_if::OdometrySample& sample,
+                                               const OdometryState& in_W,
+                                               const PastStates::Past& then) noexcept {
+  const Quaternion turn = in_W.q * then.q_WB.conjugate();
+  const double sign = turn.w() < 0.0 ? -2.0 : 2.0;
+  return {in_W.p_m - then.p_WB,
+          sign * turn.vec(),
+          in_W.v_mps - then.v_WB,
+          std::fmax(sample.sigma_position_m, kLeastSigma_m),
+          std::fmax(sample.sigma_attitude_rad, kLeastSigma_rad),
+          std::fmax(sample.sigma_speed_mps, kLeastSigma_mps)};
+}
+
+bool Estimator::fits(const Innovation& i) const noexcept {
+  const auto within = [this](int first, const Vector3& innovation, double sigma) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double S = P_(first + axis, first + axis) + sigma * sigma;
+      if (!(innovation[axis] * innovation[axis] <= config_.gate_sigma * config_.gate_sigma * S)) return false;
+    }
+    return true;
+  };
+  return within(kPosition, i.p_m, i.sigma_p_m) && within(kAttitude, i.angle_rad, i.sigma_rad) &&
+         within(kVelocity, i.v_mps, i.sigma_mps);
+}
+
+void Estimator::correct_by(const Innovation& i) noexcept {
+  for (int axis = 0; axis < 3; ++axis) {
+    (void)correct(kPosition + axis, i.p_m[axis], i.sigma_p_m);
+    (void)correct(kAttitude + axis, i.angle_rad[axis], i.sigma_rad);
+    (void)correct(kVelocity + axis, i.v_mps[axis], i.sigma_mps);
+  }
+}
+
+double Estimator::position_sigma_m() const noexcept {
+  return std::sqrt(std::fmax(P_(0, 0), std::fmax(P_(1, 1), P_(2, 2))));
+}
+
+bool Estimator::try_anchor(const firmware_if::OdometrySample& sample, const OdometryState& in_O,
+                           const PastStates::Past& then) noexcept {
+  const bool agrees = candidate_ && candidate_->anchor.reset_counter() == sample.reset_counter &&
+                      fits(innovation_of(sample, candidate_->anchor.in_W(in_O), then));
+  if (!agrees) {
+    candidate_ = Candidate{OdometryAnchor(in_O, then, sample.reset_counter), sample.stamp};
+    return false;
+  }
+  if (sample.stamp - candidate_->since < kAnchorPatience) return false;
+  if (position_sigma_m() > kMapLost_m) ++map_number_;
+  anchor_ = candidate_->anchor;
+  ++counters_.anchored;
+  return true;
+}
+
+Status Estimator::update(const firmware_if::OdometrySample& sample) noexcept {
+  OdometryState in_O;
+  if (read_odometry(sample, in_O) != Status::kOk) {
+    ++counters_.refused_not_finite;
+    return Status::kInvalidArgument;
+  }
+  if (!started_) {
+    if (counters_.imu == 0) return Status::kNotReady;
+    if (first_odometry_ == MonotonicTime{}) first_odometry_ = sample.stamp;
+    if (sample.stamp - first_odometry_ >= kFixPatience) start(sample, in_O);
+    return Status::kNotReady;
+  }
+  const PastStates::Past* then = past_.at(sample.stamp);
+  if (sample.stamp <= odometry_stamp_ || then == nullptr) {
+    ++counters_.refused_stamp;
+    return Status::kStale;
+  }
+  odometry_stamp_ = sample.stamp;
+  // What was lost for long has to agree with itself again, as at its start.
+  const bool follows = follows_odometry(sample.stamp) && anchor_->reset_counter() == sample.reset_counter &&
+                 fits(innovation_of(sample, anchor_->in_W(in_O), *then));
+  if (!follows) {
+    ++counters_.refused_gate;
+    if (!try_anchor(sample, in_O, *then)) return Status::kNotReady;
+  }
+  candidate_.reset();
+  last_odometry_ = sample.stamp;
+  correct_by(innovation_of(sample, anchor_->in_W(in_O), *then));
+  ++counters_.odometry;
+  reset_if_broken();
+  return Status::kOk;
+}
+
+bool Estimator::place_frame(const firmware_if::GnssFix& fix, const Vector3& innovation_m) noexcept {
+  const auto verdict =
+      shift_.update(innovation_m, largest_sigma_m(fix), config_.gate_sigma, fix.stamp);
+  if (verdict == FrameShift::Verdict::kRefused) {
+    ++counters_.refused_gate;
+    return false;
+  }
+  if (verdict == FrameShift::Verdict::kJumped) {
+    // The odometry may have slipped as well as the fixes: what was mapped before may lie elsewhere.
+    ++counters_.jumps;
+    ++map_number_;
+  }
+  return true;
+}
+
 Status Estimator::state(EstimatedState& out) const noexcept {
   if (!started_) return Status::kNotReady;
   out = state_;
-  out.position_sigma_m = std::sqrt(std::fmax(P_(0, 0), std::fmax(P_(1, 1), P_(2, 2))));
+  out.map_sigma_m = position_sigma_m();
+  out.map_sigma_rad = std::sqrt(std::fmax(P_(6, 6), std::fmax(P_(7, 7), P_(8, 8))));
+  out.shift_W = shift_.shift_W();
+  out.drift_ratio = anchor_ ? config_.drift_ratio : 0.0;
+  out.position_sigma_m = anchor_ ? core::hypot2(out.map_sigma_m, shift_.sigma_m()) : out.map_sigma_m;
+  out.map_number = map_number_;
   return Status::kOk;
 }
 
@@ -222,7 +373,9 @@ void Estimator::reset_if_broken() noexcept {
                     is_finite(gyro_bias_B_) && is_finite(accel_bias_B_) && P_.diagonal().allFinite();
   if (fine) return;
   ++counters_.resets;
+  ++map_number_;
   started_ = false;
+  first_odometry_ = {};
   past_.clear();
 }
 

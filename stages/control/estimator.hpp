@@ -1,16 +1,20 @@
-/// Where the vehicle is: an error-state Kalman filter over IMU, GNSS and barometer.
+/// Where the vehicle is: an error-state Kalman filter over IMU, odometry, GNSS and barometer.
 /// Source: J. Sola, "Quaternion kinematics for the error-state Kalman filter" (2017), attitude error in the
 /// world frame.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "core/geometry/vector.hpp"
 #include "firmware_if/assert.hpp"
 #include "firmware_if/barometer.hpp"
 #include "firmware_if/gnss.hpp"
 #include "firmware_if/imu.hpp"
+#include "firmware_if/odometry.hpp"
 #include "firmware_if/status.hpp"
+#include "stages/control/frame_shift.hpp"
+#include "stages/control/odometry_anchor.hpp"
 #include "stages/control/past_states.hpp"
 
 namespace roborun::stages {
@@ -21,12 +25,30 @@ struct EstimatedState {
   Vector3 v_WB = Vector3::Zero();
   Quaternion q_WB = Quaternion::Identity();
   Vector3 w_WB_B = Vector3::Zero();
-  double position_sigma_m{};  ///< Largest standard deviation of the three axes.
+  double position_sigma_m{};  ///< Largest standard deviation of the three axes, on the earth: with odometry's drift.
+  /// Add to a place in W, the frame that is flown and mapped in: where satellite navigation says that it is.
+  Vector3 shift_W = Vector3::Zero();
+  /// Of p_WB and q_WB against what was mapped a moment ago: the largest of each three axes.
+  double map_sigma_m{}, map_sigma_rad{};
+  double drift_ratio{};  ///< By which the flown frame drifts, per metre flown; 0 where nothing but GNSS holds it.
+  /// Another number: nobody knows how far the vehicle is from where what was mapped before says.
+  std::uint32_t map_number{};
 };
 
 /// 15 error states: position, velocity, attitude, gyro bias, accelerometer bias. A fix that arrives late is
 /// compared with the state at its own instant and its correction applied to the present: at 100 ms and these
 /// rates the error of doing so is far below the receiver's noise.
+///
+/// Order of trust, each taking over where the one before is lost, without a jump of the state:
+///  1. the IMU, always: whatever else jumps against it is not followed;
+///  2. odometry, where it is heard: fixes then only say where the flown frame lies on the earth (FrameShift), the heading
+///     of fixes only at the start, and the barometer nothing;
+///  3. fixes, less the shift known by then, with their heading;
+///  4. the barometer, for the height alone.
+/// A vehicle that hears odometry for kFixPatience and no fix with a heading starts without: W is then O. Odometry that begins
+/// anew (reset_counter), that comes back, or that jumps without a word is anchored where the vehicle is by then, once its
+/// samples agreed for kAnchorPatience: the state and the map stay. If the state has become uncertain by more than
+/// kMapLost_m meanwhile, or fixes jump against odometry and nobody knows which of both it was, map_number changes.
 class Estimator {
  public:
   struct Config {
@@ -36,6 +58,7 @@ class Estimator {
     double accel_bias_walk_mps2{2e-4};  ///< Per sqrt(s). (0, 1]
     double barometer_sigma_m{0.6};      ///< Noise and drift of the sensor. (0, 100]
     double gate_sigma{6.0};             ///< Innovations beyond this are refused. [3, 20]
+    double drift_ratio{0.01};           ///< Of the odometry, per metre flown. (0, 0.2]
     Nanos imu_lost_after{25'000'000};   ///< Ten samples at 400 Hz.
     Nanos oldest_fix{450'000'000};      ///< What the ring of past states covers.
     [[nodiscard]] constexpr Status validate() const noexcept {
@@ -43,16 +66,24 @@ class Estimator {
                       accel_noise_mps2 <= 10 && gyro_bias_walk_radps > 0 && gyro_bias_walk_radps <= 1 &&
                       accel_bias_walk_mps2 > 0 && accel_bias_walk_mps2 <= 1 && barometer_sigma_m > 0 &&
                       barometer_sigma_m <= 100 && gate_sigma >= 3 && gate_sigma <= 20 &&
+                      drift_ratio > 0 && drift_ratio <= 0.2 &&
                       imu_lost_after > Nanos{0} && oldest_fix > Nanos{0};
       return ok ? Status::kOk : Status::kInvalidArgument;
     }
   };
   /// Never decrease.
   struct Counters {
-    std::uint64_t imu{}, gnss{}, barometer{};  ///< Accepted.
+    std::uint64_t imu{}, gnss{}, barometer{}, odometry{};  ///< Accepted.
     std::uint64_t refused_not_finite{}, refused_stamp{}, refused_gate{};
-    std::uint64_t resets{};  ///< A NaN got inside: started again from the next fix.
+    std::uint64_t anchored{};  ///< How often odometry began, began anew, came back or jumped.
+    std::uint64_t jumps{};     ///< Of fixes, that were believed.
+    std::uint64_t resets{};    ///< A NaN got inside: started again from the next fix.
   };
+
+  static constexpr Nanos kFixPatience{2'000'000'000};
+  static constexpr Nanos kAnchorPatience{200'000'000};
+  static constexpr Nanos kOdometryLost{500'000'000};  ///< Since the last accepted sample.
+  static constexpr double kMapLost_m = 0.3;           ///< The finest cell.
 
   /// Precondition, asserted: config.validate() is kOk.
   explicit Estimator(const Config& config) noexcept : config_(config), past_(config.oldest_fix) {
@@ -66,8 +97,10 @@ class Estimator {
   /// kNotReady before.
   [[nodiscard]] Status update(const firmware_if::GnssFix& fix) noexcept;
   [[nodiscard]] Status update(const firmware_if::BarometerSample& sample) noexcept;
+  /// kOk: believed. kNotReady: not yet, see above. RT-safe: O(1).
+  [[nodiscard]] Status update(const firmware_if::OdometrySample& sample) noexcept;
 
-  /// kNotReady before the first fix.
+  /// kNotReady before the start.
   [[nodiscard]] Status state(EstimatedState& out) const noexcept;
   /// As estimated then: a late fix corrects the present only.
   [[nodiscard]] const PastStates& past() const noexcept { return past_; }
@@ -81,7 +114,35 @@ class Estimator {
   static constexpr int kStates = 15;
   using Covariance = Eigen::Matrix<double, kStates, kStates>;
 
+  /// A frame of the odometry that is not believed yet.
+  struct Candidate {
+    OdometryAnchor anchor{};
+    MonotonicTime since{};
+  };
+  /// What a sample of the odometry says besides what was estimated for its instant; world frame.
+  struct Innovation {
+    Vector3 p_m, angle_rad, v_mps;
+    double sigma_p_m, sigma_rad, sigma_mps;
+  };
+
   void start(const firmware_if::GnssFix& fix) noexcept;
+  void start(const firmware_if::OdometrySample& sample, const OdometryState& in_O) noexcept;
+  /// At rest in every respect but the state, which is there.
+  void begin_filter() noexcept;
+  [[nodiscard]] bool follows_odometry(MonotonicTime at) const noexcept {
+    return anchor_ && at - last_odometry_ <= kOdometryLost;
+  }
+  [[nodiscard]] static Innovation innovation_of(const firmware_if::OdometrySample& sample,
+                                                const OdometryState& in_W,
+                                                const PastStates::Past& then) noexcept;
+  [[nodiscard]] bool fits(const Innovation& innovation) const noexcept;
+  void correct_by(const Innovation& innovation) noexcept;
+  /// Odometry that is not followed: true if it is from now on.
+  bool try_anchor(const firmware_if::OdometrySample& sample, const OdometryState& in_O,
+                  const PastStates::Past& then) noexcept;
+  /// What a fix says of the flown frame while odometry holds it.
+  [[nodiscard]] bool place_frame(const firmware_if::GnssFix& fix, const Vector3& innovation_m) noexcept;
+  [[nodiscard]] double position_sigma_m() const noexcept;
   void propagate_covariance(double dt_s) noexcept;
   /// One scalar measurement of error state `index`; false if gated out.
   bool correct(int index, double innovation, double sigma) noexcept;
@@ -105,6 +166,13 @@ class Estimator {
   MonotonicTime last_gnss_{};
   MonotonicTime last_barometer_{};
   PastStates past_;
+  std::optional<OdometryAnchor> anchor_;
+  std::optional<Candidate> candidate_;
+  MonotonicTime first_odometry_{}, last_odometry_{}, odometry_stamp_{};  ///< Heard, accepted, newest.
+  FrameShift shift_;
+  bool fixes_agreed_{false};       ///< Since the start: only then one that differs is a jump.
+  double barometer_shift_m_{0.0};  ///< Its altitude less the height, while odometry holds that.
+  std::uint32_t map_number_{0};
 };
 
 }  // namespace roborun::stages

@@ -83,7 +83,6 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
   dirty_pool_ = &arena.last_pool();
   known_count_ = arena.take<std::uint16_t>(config.max_bricks, "map known counts");
   known_pool_ = &arena.last_pool();
-  std::fill(slot_.begin(), slot_.end(), kUnknownBrick);
   cameras_.lattice = config.lattice;
   free_brick_.fill(evidence::kFree);
   surface_brick_.fill(evidence::kUnknown);
@@ -97,13 +96,21 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
   high_ = cell_at(config.bounds_W.max_W);
   high_ = {std::min(high_.x, nx_ * kBrickCells - 1), std::min(high_.y, ny_ * kBrickCells - 1),
            std::min(high_.z, nz_ * kBrickCells - 1)};
+  forget();
+  for (std::size_t i = 0; i < config.max_frames; ++i)
+    pyramid_[i].emplace(arena, config.max_image_width, config.max_image_height);
+}
+
+void BrickMap::forget() noexcept {
+  std::fill(slot_.begin(), slot_.end(), kUnknownBrick);
   // Highest slot first, so that slots are handed out from 0 up.
   for (std::size_t i = 0; i < free_list_.size(); ++i) {
     free_list_[i] = static_cast<std::uint32_t>(free_list_.size() - 1 - i);
   }
   free_count_ = free_list_.size();
-  for (std::size_t i = 0; i < config.max_frames; ++i)
-    pyramid_[i].emplace(arena, config.max_image_width, config.max_image_height);
+  dirty_count_ = 0;
+  known_cells_ = 0;
+  view_radius_m_ = 0.0;
 }
 
 const Brick* BrickMap::brick_at(std::size_t position) const noexcept {

@@ -66,6 +66,7 @@ class BrickMap final : public OccupancyMap, private MapView {
                                  IntegrationResult& result) noexcept override;
   [[nodiscard]] Status export_view(const ExportRequest& request, core::StageBudget& budget,
                                    core::Work& work) noexcept override;
+  void forget() noexcept override;
   [[nodiscard]] const MapView& view() const noexcept override { return *this; }
   [[nodiscard]] double known_volume_m3() const noexcept override;
   [[nodiscard]] std::size_t bytes() const noexcept override;

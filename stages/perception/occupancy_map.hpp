@@ -55,7 +55,8 @@ struct ExportRequest {
 ///     are free, and the cell at its end (or a face neighbour) is occupied.
 ///  3. A free write at a coarse level never clears a finer cell in which a surface was seen in this scan.
 ///  4. Evidence is bounded: what moved away is free again after at most 10 scans that look through it.
-///  5. The same calls in the same order give the same map: digest() is equal, on every machine (own backend).
+///  5. After forget() it answers as a new one.
+///  6. The same calls in the same order give the same map: digest() is equal, on every machine (own backend).
 class OccupancyMap {
  public:
   virtual ~OccupancyMap() = default;
@@ -68,7 +69,9 @@ class OccupancyMap {
   /// work.units: bricks or nodes visited; work.volume_m3: known space inside the view.
   [[nodiscard]] virtual Status export_view(const ExportRequest& request, core::StageBudget& budget,
                                            core::Work& work) noexcept = 0;
-  /// The view of the last export_view(); stays valid until the next integrate().
+  /// Everything is unknown again, and the view is empty: what is in the map is not where it was. RT-safe: O(size of the map).
+  virtual void forget() noexcept = 0;
+  /// The view of the last export_view(); stays valid until the next integrate() or forget().
   [[nodiscard]] virtual const MapView& view() const noexcept = 0;
 
   [[nodiscard]] virtual double known_volume_m3() const noexcept = 0;

@@ -1,10 +1,12 @@
 #include "stages/perception/point_cloud.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/random/counter_rng.hpp"
 #include "firmware_if/assert.hpp"
+#include "stages/perception/depth_steps.hpp"
 
 namespace roborun::stages {
 
@@ -50,8 +52,52 @@ bool PointCloud::add(const Vector3& p_W, double cell_m) noexcept {
   return true;
 }
 
-Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core::StageBudget& budget,
-                        core::Work& work) noexcept {
+PointCloud::Wanted::Wanted(const CloudNeed& need, double cell_m) noexcept
+    : center_W_(need.center_W),
+      low_m_(need.low_m - 1.01 * cell_m),
+      high_m_(need.high_m + 1.01 * cell_m),
+      diagonal_m_(1.75 * cell_m),
+      least_reach_m_(need.reach_m + diagonal_m_),
+      inner_W_{need.box_W.min_W + Vector3::Constant(1.01 * cell_m),
+               need.box_W.max_W - Vector3::Constant(1.01 * cell_m)} {}
+
+bool PointCloud::Wanted::includes(const Vector3& p_W) noexcept {
+  if (p_W.z() < low_m_ || p_W.z() > high_m_) return false;
+  const double distance2_m2 = (p_W - center_W_).squaredNorm();
+  if (distance2_m2 > reach2_m2_) return false;
+  if (distance2_m2 < nearest2_m2_ && inner_W_.contains(p_W)) {
+    nearest2_m2_ = distance2_m2;
+    // Its mean is at most a diagonal farther away than it; so is no other mean that is nearer still, from any of its pixels.
+    const double reach_m = std::fmax(least_reach_m_, std::sqrt(distance2_m2) + 2.0 * diagonal_m_);
+    reach2_m2_ = reach_m * reach_m;
+  }
+  return true;
+}
+
+bool PointCloud::add_row(const Row& row, double cell_m, Wanted& wanted) noexcept {
+  const firmware_if::DepthFrame& frame = row.posed.frame;
+  const Vector3 from_W = row.posed.X_WC.p_RT;
+  const auto range_m = static_cast<double>(frame.range_m);
+  const double above_m = std::fmax(high_m_ - from_W.z(), 0.0), below_m = std::fmax(from_W.z() - low_m_, 0.0);
+  const float* const raw = frame.depth_m.data() + row.v * frame.width;
+  bool room = true;
+  for (std::size_t u = 0; u < frame.width; ++u) {
+    if (!(raw[u] > frame.range_min_m)) continue;
+    const Vector3 direction_W = row.posed.X_WC.R_RT * Vector3(1.0, row.y[u], row.z);
+    double depth_m = std::fmin(static_cast<double>(raw[u]), range_m);
+    if (raw[u] < frame.range_m) {
+      const Vector3 p_W = from_W + depth_m * direction_W;
+      if (wanted.includes(p_W) && !add(p_W, cell_m)) room = false;
+    }
+    if (direction_W.z() > 0.0) depth_m = std::fmin(depth_m, above_m / direction_W.z());
+    if (direction_W.z() < 0.0) depth_m = std::fmin(depth_m, below_m / -direction_W.z());
+    seen_volume_m3_ += row.pixel_area * depth_m * depth_m * depth_m / 3.0;
+  }
+  return room;
+}
+
+Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, const CloudNeed& need,
+                        core::StageBudget& budget, core::Work& work) noexcept {
   ++counters_.steps;
   for (std::size_t i = 0; i < count_; ++i) grid_[used_[i]] = {};
   count_ = 0;
@@ -59,10 +105,12 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core
   work = {};
   work.level = level;
   const double cell_m = lattice_.cell_size_m(level);
+  Wanted wanted(need, cell_m);
   guard_.begin(frames);
   std::size_t usable = 0;
   bool full = false;
   bool spent = false;
+  std::array<double, kMaxImageSide> y;
   for (const PosedDepthFrame& posed : frames) {
     if (spent) break;
     if (guard_.check(posed) != Status::kOk) {
@@ -73,24 +121,12 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, core
     const firmware_if::DepthFrame& frame = posed.frame;
     const auto across = static_cast<double>(frame.tan_half_width);
     const auto along = static_cast<double>(frame.tan_half_height);
-    const double pixel_area = 4.0 * across * along / (frame.width * frame.height);  // of the plane at depth 1
+    for (int u = 0; u < frame.width; ++u)
+      y[static_cast<std::size_t>(u)] = across - (u + 0.5) * 2.0 * across / frame.width;
+    const double pixel_area = 4.0 * across * along / (frame.width * frame.height);
     for (int v = 0; v < frame.height && !spent; ++v) {
       const double z = along - (v + 0.5) * 2.0 * along / frame.height;
-      for (int u = 0; u < frame.width; ++u) {
-        const float raw_m =
-            frame.depth_m[static_cast<std::size_t>(v) * frame.width + static_cast<std::size_t>(u)];
-        if (!(raw_m > frame.range_min_m)) continue;
-        const double y = across - (u + 0.5) * 2.0 * across / frame.width;
-        const Vector3 direction_W = posed.X_WC.R_RT * Vector3(1.0, y, z);
-        double depth_m = std::fmin(static_cast<double>(raw_m), static_cast<double>(frame.range_m));
-        if (raw_m < frame.range_m && !add(posed.X_WC.p_RT + depth_m * direction_W, cell_m)) full = true;
-        const double height_m = posed.X_WC.p_RT.z();
-        if (direction_W.z() > 0.0)
-          depth_m = std::fmin(depth_m, std::fmax(high_m_ - height_m, 0.0) / direction_W.z());
-        if (direction_W.z() < 0.0)
-          depth_m = std::fmin(depth_m, std::fmax(height_m - low_m_, 0.0) / -direction_W.z());
-        seen_volume_m3_ += pixel_area * depth_m * depth_m * depth_m / 3.0;
-      }
+      if (!add_row({posed, static_cast<std::size_t>(v), z, y, pixel_area}, cell_m, wanted)) full = true;
       work.units += frame.width;
       spent = budget.spent(work);
     }

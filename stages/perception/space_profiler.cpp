@@ -94,6 +94,13 @@ void profile_outlook(const SpaceProfilerConfig& config, const MapView& view, con
 
 }  // namespace
 
+CloudNeed needed_points(const SpaceProfilerConfig& config, const Vector3& p_WB,
+                        const Aabb& relevant_W) noexcept {
+  return {p_WB, core::hypot2(config.gap_reach_m, config.height_band_m),
+          std::fmin(relevant_W.min_W.z(), p_WB.z() - config.height_band_m),
+          std::fmax(relevant_W.max_W.z(), p_WB.z() + config.height_band_m), relevant_W};
+}
+
 Status profile_space(const SpaceProfilerConfig& config, std::span<const CloudPoint> points,
                      const MapView& map, const Trajectory& committed, MonotonicTime now, const Vector3& p_WB,
                      const Vector3& v_WB, const Vector3& goal_W, const Aabb& relevant_W, double radius_m,

@@ -32,6 +32,10 @@ struct SpaceProfilerConfig {
   }
 };
 
+/// Of a cloud, what profile_space() asks for: without the rest its figures are the same.
+[[nodiscard]] CloudNeed needed_points(const SpaceProfilerConfig& config, const Vector3& p_WB,
+                                      const Aabb& relevant_W) noexcept;
+
 /// Gaps: the points in the height band are sorted into 72 sectors of 5 degrees, the nearest point of each
 /// kept. Neighbouring sectors whose ranges differ by less than 3 m show one obstacle; between all others
 /// there is a gap: the distance of their points, counted if the vehicle fits through and it is not wider than

@@ -52,7 +52,7 @@ struct PlanResult {
 ///     the goal promises to be nearest: least path length plus kUnknownWeight times the remaining straight
 ///     distance.
 ///  3. These are answers, not errors:
-///      - kStartBlocked;
+///      - kStartBlocked: no path; how it is left, find_way_out() knows (way_out.hpp);
 ///      - kGoalBlocked: the goal is occupied or out of bounds; with the path to the nearest point, if there
 ///        is one;
 ///      - kNoPath: nothing is better than the start;

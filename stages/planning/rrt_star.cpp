@@ -15,7 +15,6 @@ namespace {
 constexpr double kVisitedCell_m = 4.8;
 constexpr double kVisitedCell_m3 = kVisitedCell_m * kVisitedCell_m * kVisitedCell_m;
 constexpr double kGoalBias = 0.15;
-constexpr double kEscape_m = 2.0;
 constexpr std::uint64_t kSpare = 4096;  // lookups that are granted whatever the budget says
 constexpr double kKnownReach_m = 15.0;
 constexpr double kLookAhead_m = 12.0;  // beyond a path's end
@@ -247,41 +246,6 @@ void RrtStar::extract(const PlanRequest& request, const MapView& view, std::int3
   }
 }
 
-Status RrtStar::escape(const PlanRequest& request, const MapView& view, PlanResult& result) const noexcept {
-  // The start box touches something that is not free: the nearest free place that can be reached without
-  // touching an occupied cell, in a fixed order of directions.
-  constexpr std::array<std::array<int, 3>, 10> kDirection{{{0, 0, 1},
-                                                           {1, 0, 0},
-                                                           {-1, 0, 0},
-                                                           {0, 1, 0},
-                                                           {0, -1, 0},
-                                                           {1, 1, 0},
-                                                           {1, -1, 0},
-                                                           {-1, 1, 0},
-                                                           {-1, -1, 0},
-                                                           {0, 0, -1}}};
-  const double cell_m = view.finest_m();
-  for (double distance_m = cell_m; distance_m <= kEscape_m; distance_m += cell_m) {
-    for (const auto& d : kDirection) {
-      const Vector3 direction = Vector3(d[0], d[1], d[2]).normalized();
-      const Vector3 end_W = request.start_W + distance_m * direction;
-      if (!request.bounds_W.contains(end_W) ||
-          !view.is_free(Aabb::around(end_W, request.radius_m), result.work.units))
-        continue;
-      bool clear = true;
-      for (double at_m = 0.0; at_m < distance_m && clear; at_m += 0.5 * cell_m) {
-        clear = view.at(request.start_W + at_m * direction, result.work.units) != CellState::kOccupied;
-      }
-      if (!clear) continue;
-      (void)result.path_W.push_back(request.start_W);
-      (void)result.path_W.push_back(end_W);
-      result.cost_m = distance_m;
-      return Status::kStartBlocked;
-    }
-  }
-  return Status::kStartBlocked;
-}
-
 void RrtStar::clear(Search& s) noexcept {
   const PlanRequest& request = s.request;
   count_ = 0;
@@ -302,9 +266,7 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
   const PolledView view(map, budget, work);
   Spare spare(work);
   const PolledView spare_view(map, spare, work);
-  // 1. Out of what stands where the vehicle is.
-  if (!map.is_free(Aabb::around(request.start_W, request.radius_m), work.units))
-    return escape(request, spare_view, result);
+  if (!map.is_free(Aabb::around(request.start_W, request.radius_m), work.units)) return Status::kStartBlocked;
   const bool goal_bad = !request.bounds_W.contains(request.goal_W) ||
                         view.at(request.goal_W, work.units) == CellState::kOccupied;
 
@@ -312,13 +274,13 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
   clear(s);
   const Vector3 target_W = towards_goal(request);
   const double to_target_m = (target_W - request.start_W).norm();
-  // 2. The goal is known free space: a path that ends there.
+  // 1. The goal is known free space: a path that ends there.
   if (to_target_m > kShortEdge_m && target_W == request.goal_W && !goal_bad &&
       view.is_free(Aabb::around(target_W, request.radius_m), work.units)) {
     const Status status = connect(s, result);
     if (status != Status::kNoPath) return status;
   }
-  // 3. The straight way, if it is free to its end; otherwise its free part is the first branch of the tree.
+  // 2. The straight way, if it is free to its end; otherwise its free part is the first branch of the tree.
   std::int32_t best = 0;
   if (to_target_m > kShortEdge_m) {
     const double free_m = free_distance_m(spare_view, request.start_W, target_W - request.start_W,
@@ -336,7 +298,7 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
       return goal_bad ? Status::kGoalBlocked : Status::kOk;
     }
   }
-  // 4. As near to the goal as known free space reaches.
+  // 3. As near to the goal as known free space reaches.
   return explore(s, map, goal_bad, best, result);
 }
 

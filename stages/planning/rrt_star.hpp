@@ -50,8 +50,8 @@ class RrtStar final : public Planner {
   RrtStar(const Config& config, core::Arena& arena) noexcept;
 
   /// Explored volume: distinct 4.8 m cells that hold a node, times their size. Polls the budget at every
-  /// sample and every 1,024 lookups. Whatever it says, 4,096 lookups are granted to the straight way or the
-  /// way out, and as many to shorten what was found.
+  /// sample and every 1,024 lookups. Whatever it says, 4,096 lookups are granted to the straight way,
+  /// and as many to shorten what was found.
   [[nodiscard]] Status plan(const PlanRequest& request, const MapView& view, core::StageBudget& budget,
                             PlanResult& result) noexcept override;
 
@@ -142,8 +142,6 @@ class RrtStar final : public Planner {
                                 std::uint64_t& lookups) const noexcept;
   void extract(const PlanRequest& request, const MapView& view, std::int32_t node,
                PlanResult& result) noexcept;
-  [[nodiscard]] Status escape(const PlanRequest& request, const MapView& view,
-                              PlanResult& result) const noexcept;
 
   Config config_;
   std::span<Node> node_;

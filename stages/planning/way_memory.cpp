@@ -85,7 +85,19 @@ WayMemory::WayMemory(const Config& config, core::Arena& arena) noexcept
   const Extent e = extent_of(config);
   corner_ = {e.corner[0], e.corner[1], e.corner[2]};
   size_ = {e.size[0], e.size[1], e.size[2]};
+  forget();
+}
+
+void WayMemory::forget() noexcept {
+  std::fill(position_.begin(), position_.end(), Position{});
   for (std::size_t i = 0; i < block_.size(); ++i) block_[i].position = static_cast<std::uint32_t>(i + 1);
+  free_ = 0;
+  block_count_ = 0;
+  seen_count_ = 0;
+  ++search_;  // what was found by the last one is not there any more
+  looked_from_W_ = Vector3::Constant(1e9);
+  seen_low_ = {0, 0, 0};
+  seen_high_ = {-1, -1, -1};
 }
 
 WayMemory::Cell WayMemory::place_of(const Vector3& p_W) const noexcept {

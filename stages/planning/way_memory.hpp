@@ -44,9 +44,13 @@ class WayMemory {
   Status look(const MapView& map, const Vector3& p_W, double reach_m, core::StageBudget& budget,
               core::Work& work) noexcept;
   /// The ways to the goal from everywhere that is not farther from it than the vehicle. kOk; kNoPath: there is none, as
-  /// far as is known now; kStartBlocked, kGoalBlocked: no place of the vehicle is near; kBudgetSpent: no answer.
+  /// far as is known now; kStartBlocked, kGoalBlocked: no place of the vehicle is near (or from those near the start
+  /// no way leads on, which proves nothing); kBudgetSpent: no answer.
   Status solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
                core::Work& work) noexcept;
+
+  /// Nothing is known of any way. RT-safe: O(size of the world).
+  void forget() noexcept;
 
   /// Metres of known way, after solve(); +inf where it did not come.
   [[nodiscard]] double to_goal_m(const Vector3& p_W) const noexcept;

@@ -162,7 +162,9 @@ Status WayMemory::solve(const Vector3& from_W, const Vector3& goal_W, core::Stag
     relax(node);
   }
   if (is_settled(first)) return Status::kOk;
-  return overflown_ ? Status::kBudgetSpent : Status::kNoPath;
+  if (overflown_) return Status::kBudgetSpent;
+  // Of a room beside the vehicle no way may lead on while one leads on from the vehicle: no proof.
+  return room_at(place_of(from_W)) != 0 ? Status::kNoPath : Status::kStartBlocked;
 }
 
 double WayMemory::to_goal_m(const Vector3& p_W) const noexcept {

@@ -38,6 +38,7 @@ class VoxelMap final : public roborun::stages::OccupancyMap {
     work = {1, std::min(request.volume_m3, known_volume_m3()), request.level};
     return Status::kOk;
   }
+  void forget() noexcept override { cells_.forget(); }
   [[nodiscard]] const roborun::stages::MapView& view() const noexcept override { return cells_; }
   [[nodiscard]] double known_volume_m3() const noexcept override { return cells_.known_volume_m3(); }
   [[nodiscard]] std::size_t bytes() const noexcept override { return cells_.bytes(); }

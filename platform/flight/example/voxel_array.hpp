@@ -1,6 +1,7 @@
 /// Cells in one array, and what planner and smoother may ask of them.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "core/record/state_hash.hpp"
@@ -25,6 +26,10 @@ class VoxelArray final : public roborun::stages::MapView {
     if (!holds(at)) return;
     known_m3_ += state(at) == CellState::kUnknown ? kCell_m * kCell_m * kCell_m : 0.0;
     cell_[flat(at)] = to;
+  }
+  void forget() noexcept {
+    std::fill(cell_.begin(), cell_.end(), CellState::kUnknown);
+    known_m3_ = 0.0;
   }
   void show(const Aabb& window_W) noexcept { window_W_ = window_W; }
   [[nodiscard]] double known_volume_m3() const noexcept { return known_m3_; }

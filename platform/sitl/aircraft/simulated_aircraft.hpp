@@ -46,6 +46,7 @@ class SimulatedAircraft final : public flight::Aircraft {
                     const OutsideActuators& outside = {})
       : vehicle_(vehicle, config.wind, ground_W, seed),
         sensors_(NavigationSensors(config.sensors, seed)),
+        has_odometry_(config.sensors.odometry != OdometryModel::kNone),
         cameras_(cameras),
         far_side_(seed, outside),
         actuators_(minor_frame, far_side_.bus(), far_side_.kill_open(), far_side_.kill_closed()),
@@ -88,6 +89,9 @@ class SimulatedAircraft final : public flight::Aircraft {
   [[nodiscard]] firmware_if::Imu& imu() noexcept override { return sensors_; }
   [[nodiscard]] firmware_if::Gnss& gnss() noexcept override { return sensors_; }
   [[nodiscard]] firmware_if::Barometer& barometer() noexcept override { return sensors_; }
+  [[nodiscard]] firmware_if::Odometry* odometry() noexcept override {
+    return has_odometry_ ? &sensors_ : nullptr;
+  }
   [[nodiscard]] firmware_if::Motors& motors() noexcept override { return actuators_; }
   [[nodiscard]] flight::AircraftHealth health(MonotonicTime now) noexcept override {
     return {actuators_.charge_ratio(now), actuators_.esc_silence(now), hears_operator(),
@@ -129,6 +133,7 @@ class SimulatedAircraft final : public flight::Aircraft {
 
   Vehicle vehicle_;
   FaultySensors sensors_;
+  bool has_odometry_;
   ExposureSink& cameras_;
   SimulatedActuators far_side_;
   flight::ActuatorSide actuators_;

@@ -12,6 +12,7 @@ namespace roborun::sitl {
 enum class Component : std::uint8_t {
   kImu,
   kGnss,
+  kOdometry,
   kBarometer,
   kDepth,  ///< Instance: camera 0 .. 5 (forward, left, back, right, up, down).
   kBattery,
@@ -26,7 +27,7 @@ enum class Component : std::uint8_t {
   kCpu,
   kWind,
 };
-inline constexpr std::size_t kComponentCount = 15;
+inline constexpr std::size_t kComponentCount = 16;
 
 enum class FaultKind : std::uint8_t {
   kNone,
@@ -38,6 +39,8 @@ enum class FaultKind : std::uint8_t {
   kDelayed,       ///< Late by 0.4 s, IMU by 50 ms. Clock: stamps of 0.2 s ago.
   kIntermittent,  ///< Half of it lost, at random. Kill switch: pulses of one sample.
   kOn,            ///< Kill switch: pressed. Wind: a storm.
+  kJump,          ///< 2 m to the north, without a word.
+  kReset,         ///< Begins anew, elsewhere and turned, and says so.
 };
 
 /// One row: which kinds make sense for a component, and of how many instances.
@@ -55,11 +58,13 @@ inline constexpr std::array<ComponentSpec, kComponentCount> kComponents = [] {
   using C = Component;
   constexpr std::uint16_t off = bit(FaultKind::kOff), stuck = bit(FaultKind::kStuck), garbage = bit(FaultKind::kGarbage),
       wrong = bit(FaultKind::kWrong), slow = bit(FaultKind::kSlow), delayed = bit(FaultKind::kDelayed),
-      some = bit(FaultKind::kIntermittent), on = bit(FaultKind::kOn);
+      some = bit(FaultKind::kIntermittent), on = bit(FaultKind::kOn), jump = bit(FaultKind::kJump),
+      reset = bit(FaultKind::kReset);
   constexpr std::uint16_t sensor = off | stuck | garbage | wrong | slow | delayed | some;
   return std::array<ComponentSpec, kComponentCount>{{
     {C::kImu, "imu", 1, sensor},
-    {C::kGnss, "gnss", 1, sensor},                                     // wrong: 30 m to the north
+    {C::kGnss, "gnss", 1, sensor | jump},                              // wrong: 30 m to the north
+    {C::kOdometry, "odometry", 1, off | stuck | garbage | slow | delayed | some | jump | reset},
     {C::kBarometer, "barometer", 1, sensor},                           // wrong: 30 m too high
     {C::kDepth, "depth", 6, sensor},                                   // wrong: half the distance
     {C::kBattery, "battery", 1, off | stuck | garbage | wrong},        // wrong: 5 % left
@@ -76,8 +81,8 @@ inline constexpr std::array<ComponentSpec, kComponentCount> kComponents = [] {
   }};
 }();
 // clang-format on
-inline constexpr std::array<const char*, 9> kFaultKindNames{
-    "none", "off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent", "on"};
+inline constexpr std::array<const char*, 11> kFaultKindNames{
+    "none", "off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent", "on", "jump", "reset"};
 
 struct Fault {
   Component component{};

@@ -9,6 +9,7 @@ constexpr Nanos kImuDelay{50'000'000};
 constexpr Nanos kDelay{400'000'000};
 constexpr Nanos kClockShift{200'000'000};
 constexpr std::uint32_t kSlow = 10;
+constexpr double kJump_m = 2.0;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// In [-1e6, 1e6], every third one NaN: a function of the sequence alone.
@@ -34,9 +35,36 @@ void garble(firmware_if::GnssFix& f) noexcept {
 }
 void garble(firmware_if::BarometerSample& s) noexcept { s.altitude_m = nonsense(s.sequence, 0); }
 
+void garble(firmware_if::OdometrySample& s) noexcept {
+  for (std::size_t i = 0; i < 3; ++i) {
+    s.p_OB_m[i] = nonsense(s.sequence, i);
+    s.v_OB_mps[i] = nonsense(s.sequence, 3 + i);
+  }
+}
+
 void bend(firmware_if::ImuSample& s) noexcept { s.angular_rate_B_radps[0] += 0.5; }
 void bend(firmware_if::GnssFix& f) noexcept { f.p_WB_m[1] += 30.0; }
 void bend(firmware_if::BarometerSample& s) noexcept { s.altitude_m += 30.0; }
+
+template <typename Sample>
+void bend(Sample&) noexcept {}
+
+template <typename Sample>
+void jump(Sample&) noexcept {}
+void jump(firmware_if::GnssFix& f) noexcept { f.p_WB_m[1] += kJump_m; }
+void jump(firmware_if::OdometrySample& s) noexcept { s.p_OB_m[1] += kJump_m; }
+
+template <typename Sample>
+void begin_anew(Sample&) noexcept {}
+/// A quarter turn to the left, and elsewhere.
+void begin_anew(firmware_if::OdometrySample& s) noexcept {
+  constexpr double kHalf = 0.70710678118654752;
+  const auto [w, x, y, z] = s.q_OB;
+  ++s.reset_counter;
+  s.p_OB_m = {7.0 - s.p_OB_m[1], s.p_OB_m[0] - 3.0, s.p_OB_m[2] + 1.0};
+  s.v_OB_mps = {-s.v_OB_mps[1], s.v_OB_mps[0], s.v_OB_mps[2]};
+  s.q_OB = {kHalf * (w - z), kHalf * (x - y), kHalf * (x + y), kHalf * (w + z)};
+}
 
 template <typename Sample>
 void shift_clock(FaultKind kind, Sample& s) noexcept {
@@ -71,6 +99,12 @@ Status FaultySensors::read(Component component, Nanos delay, Channel<Sample>& ch
       case FaultKind::kWrong:
         bend(sample);
         return Status::kOk;
+      case FaultKind::kJump:
+        jump(sample);
+        return Status::kOk;
+      case FaultKind::kReset:
+        begin_anew(sample);
+        return Status::kOk;
       case FaultKind::kSlow:
         if (sample.sequence % kSlow == 0) return Status::kOk;
         break;
@@ -99,6 +133,12 @@ Status FaultySensors::read(firmware_if::GnssFix& fix) noexcept {
 
 Status FaultySensors::read(firmware_if::BarometerSample& sample) noexcept {
   return read(Component::kBarometer, kDelay, barometer_, sample);
+}
+
+Status FaultySensors::read(firmware_if::OdometrySample& sample) noexcept {
+  const Status status = read(Component::kOdometry, kDelay, odometry_, sample);
+  if (status == Status::kOk && faults_ != nullptr) shift_clock(faults_->of(Component::kClock), sample);
+  return status;
 }
 
 Status FaultyDepthCamera::read(firmware_if::DepthFrame& frame) noexcept {

@@ -11,7 +11,10 @@
 
 namespace roborun::sitl {
 
-class FaultySensors final : public firmware_if::Imu, public firmware_if::Gnss, public firmware_if::Barometer {
+class FaultySensors final : public firmware_if::Imu,
+                            public firmware_if::Gnss,
+                            public firmware_if::Barometer,
+                            public firmware_if::Odometry {
  public:
   /// Implicit: sensors are healthy until somebody connects a fault line.
   FaultySensors(const NavigationSensors& sensors) noexcept  // NOLINT(google-explicit-constructor)
@@ -26,6 +29,7 @@ class FaultySensors final : public firmware_if::Imu, public firmware_if::Gnss, p
   [[nodiscard]] Status read(firmware_if::ImuSample& sample) noexcept override;
   [[nodiscard]] Status read(firmware_if::GnssFix& fix) noexcept override;
   [[nodiscard]] Status read(firmware_if::BarometerSample& sample) noexcept override;
+  [[nodiscard]] Status read(firmware_if::OdometrySample& sample) noexcept override;
 
  private:
   template <typename Sample>
@@ -43,6 +47,7 @@ class FaultySensors final : public firmware_if::Imu, public firmware_if::Gnss, p
   Channel<firmware_if::ImuSample> imu_;
   Channel<firmware_if::GnssFix> gnss_;
   Channel<firmware_if::BarometerSample> barometer_;
+  Channel<firmware_if::OdometrySample> odometry_;
 };
 
 class FaultyDepthCamera final : public firmware_if::DepthCamera {

@@ -39,7 +39,7 @@ double sky_ratio(const World& world, const Vector3& p_W) noexcept {
 }
 
 NavigationSensors::NavigationSensors(const NavigationSensorsConfig& config, std::uint64_t seed) noexcept
-    : config_(config), lattice_(seed), imu_rng_(seed, 3), gnss_rng_(seed, 4), barometer_rng_(seed, 5) {
+    : config_(config), lattice_(seed), imu_rng_(seed, 3), gnss_rng_(seed, 4), barometer_rng_(seed, 5), odometry_(config.odometry, seed) {
   const bool product = config.imu != ImuModel::kClean;
   gyro_bias_B_radps_ = normal3(imu_rng_, product ? imu_errors_.gyro_bias_radps : config.gyro_bias_radps);
   accel_bias_B_mps2_ = normal3(imu_rng_, product ? imu_errors_.accel_bias_mps2 : config.accel_bias_mps2);
@@ -65,6 +65,7 @@ NavigationSensors::NavigationSensors(const NavigationSensorsConfig& config, std:
 void NavigationSensors::sample(MonotonicTime now, const VehicleState& state) noexcept {
   now_ = now;
   sample_imu(state);
+  odometry_.sample(now, state);
   if (now >= next_gnss_) {
     next_gnss_ = now + from_seconds(1.0 / config_.gnss_rate_Hz);
     sample_gnss(state);
@@ -164,6 +165,7 @@ void NavigationSensors::sample_product_gnss(const VehicleState& state) noexcept 
 }
 
 void NavigationSensors::sample_gnss(const VehicleState& state) noexcept {
+  if (config_.gnss == GnssModel::kNone) return;
   if (config_.gnss != GnssModel::kClean) return sample_product_gnss(state);
   for (int i = 0; i < 3; ++i) {
     gnss_wander_W_m_[i] =

@@ -1,4 +1,4 @@
-/// Simulated IMU, GNSS receiver and barometer: bias, noise, rate, latency and dropouts; or the errors of products.
+/// Simulated IMU, GNSS receiver, odometry and barometer: bias, noise, rate, latency and dropouts; or the errors of products.
 #pragma once
 
 #include <array>
@@ -12,6 +12,7 @@
 #include "platform/sitl/sensors/delay_line.hpp"
 #include "platform/sitl/sensors/navigation_models.hpp"
 #include "platform/sitl/sensors/surface_lattice.hpp"
+#include "platform/sitl/sensors/visual_odometry.hpp"
 #include "platform/sitl/vehicle/vehicle.hpp"
 #include "platform/sitl/world/world.hpp"
 
@@ -21,6 +22,7 @@ namespace roborun::sitl {
 struct NavigationSensorsConfig {
   ImuModel imu{};
   GnssModel gnss{};
+  OdometryModel odometry{};
   // IMU: an industrial MEMS part (ADIS16470 class), one sample a minor frame.
   double gyro_noise_radps{0.0012};  ///< One sigma a sample at 400 Hz.
   double gyro_bias_radps{0.002};    ///< One sigma at switch-on.
@@ -47,7 +49,8 @@ struct NavigationSensorsConfig {
 
 class NavigationSensors final : public firmware_if::Imu,
                                 public firmware_if::Gnss,
-                                public firmware_if::Barometer {
+                                public firmware_if::Barometer,
+                                public firmware_if::Odometry {
  public:
   NavigationSensors(const NavigationSensorsConfig& config, std::uint64_t seed) noexcept;
 
@@ -62,6 +65,7 @@ class NavigationSensors final : public firmware_if::Imu,
   [[nodiscard]] Status read(firmware_if::BarometerSample& s) noexcept override {
     return barometer_.pop(s, now_);
   }
+  [[nodiscard]] Status read(firmware_if::OdometrySample& s) noexcept override { return odometry_.read(s); }
 
  private:
   void sample_imu(const VehicleState& state) noexcept;
@@ -107,6 +111,7 @@ class NavigationSensors final : public firmware_if::Imu,
   DelayLine<firmware_if::ImuSample, 16> imu_;
   DelayLine<firmware_if::GnssFix, 16> gnss_;
   DelayLine<firmware_if::BarometerSample, 16> barometer_;
+  VisualOdometry odometry_;
 };
 
 }  // namespace roborun::sitl

@@ -52,6 +52,11 @@ class OctomapBackend final : public OccupancyMap, private MapView {
       return Status::kCapacity;
     }
   }
+  void forget() noexcept override {
+    for (const auto& tree : tree_) tree->clear();
+    known_m3_ = 0.0;
+    count_ = {};
+  }
   [[nodiscard]] const MapView& view() const noexcept override { return *this; }
   [[nodiscard]] double known_volume_m3() const noexcept override { return known_m3_; }
   [[nodiscard]] std::size_t bytes() const noexcept override {

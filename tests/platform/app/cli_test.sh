@@ -57,6 +57,46 @@ refuses "--scale: '2x' is out of range: must be a number from" fly --world nope.
 refuses "must be from 0.01 to 5" world check "$data/worlds/two_pillars.toml" --resolution 1e-9
 refuses "cannot be written" world check "$data/worlds/two_pillars.toml" --plot /nonexistent/x.svg
 refuses "outside the bounds" world check "$data/worlds/two_pillars.toml" --start 900,0,3
+recorded=/tmp/roborun_cli_test_recorded.$$
+mkdir -p "$recorded"
+refuses "nope: must be a folder" map build --from nope
+refuses "no frames: must hold depth.txt and groundtruth.txt" map build --from "$recorded" --json
+python3 - "$recorded" <<'PY'
+import struct, sys, zlib
+def png(path, width, height, bits):
+    def chunk(name, data):
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+    row = b"\0" + (b"\x08\0" if bits == 16 else b"\x08") * width
+    open(path, "wb").write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, 0, 0, 0, 0))
+                           + chunk(b"IDAT", zlib.compress(row * height)) + chunk(b"IEND", b""))
+for i in range(2):
+    png(f"{sys.argv[1]}/{i}.png", 32, 24, 16)
+PY
+optics=(--intrinsics 20,20,15.5,11.5 --depth-scale 1000)
+refuses "poses.txt: cannot be opened" map build --from "$recorded" "${optics[@]}"
+echo "0 0 0 1 0 0 0 1" >"$recorded/poses.txt"
+refuses "1 poses for 2 files: must have a line for each" map build --from "$recorded" "${optics[@]}"
+echo "0 0 0 1 0 nan 0 1" >>"$recorded/poses.txt"
+refuses "poses.txt:2: 'nan': must be a finite number" map build --from "$recorded" "${optics[@]}"
+printf '0 0 0 1 0 0 0 1\n1 0 0 1 0 0 0 1\n' >"$recorded/poses.txt"
+refuses "camera.txt: cannot be opened" map build --from "$recorded"
+refuses "must be given both or none" map build --from "$recorded" --depth-scale 1000
+refuses "must be FX,FY,CX,CY" map build --from "$recorded" --depth-scale 1000 --intrinsics 1,2,3
+refuses "--intrinsics: 'x'" map build --from "$recorded" --depth-scale 1000 --intrinsics x,2,3,4
+refuses "--precision" map build --from "$recorded" "${optics[@]}" --precision 0.01
+refuses "--range" map build --from "$recorded" "${optics[@]}" --range nan
+refuses "must be one of clean, d435" map build --from "$recorded" "${optics[@]}" --model kinect
+refuses "must end in .bt or .ot" map build --from "$recorded" "${optics[@]}" -o map.txt
+refuses "cannot be written" map build --from "$recorded" "${optics[@]}" -o /nonexistent/map.bt
+if ! "$roborun" map build --from "$recorded" "${optics[@]}" --json 2>/dev/null | python3 -c 'import json, sys
+assert list(json.load(sys.stdin)) == "frames ms_median ms_p99 bytes false_free_ratio false_occupied_ratio missed_ratio".split()'; then
+  echo "FAILED map build --json: not the seven keys"
+  failed=$((failed + 1))
+fi
+truncate -s -20 "$recorded/1.png"
+refuses "1.png: it is cut off: must be a whole PNG file" map build --from "$recorded" "${optics[@]}" -o "$recorded/map.bt"
+[[ ! -e $recorded/map.bt ]] || { echo "FAILED map build: left a file of a bad recording"; failed=$((failed + 1)); }
+rm -r "$recorded"
 refuses "must be X,Y,Z,X,Y,Z" world check "$data/worlds/two_pillars.toml" --bounds 1,2,3
 refuses "goes with point clouds" world check "$data/worlds/two_pillars.toml" --cell 0.1
 refuses "does not go with .toml" fly --world "$data/worlds/two_pillars.toml" --scale 2

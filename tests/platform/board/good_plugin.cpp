@@ -23,6 +23,7 @@ class Map final : public stages::OccupancyMap, stages::MapView {
                                    core::Work&) noexcept override {
     return Status::kOk;
   }
+  void forget() noexcept override {}
   [[nodiscard]] const MapView& view() const noexcept override { return *this; }
   [[nodiscard]] double known_volume_m3() const noexcept override { return 0.0; }
   [[nodiscard]] std::size_t bytes() const noexcept override { return side_; }

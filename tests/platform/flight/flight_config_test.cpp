@@ -36,5 +36,23 @@ TEST(FlightConfig, IsRefusedWhereANumberCannotBe) {
   EXPECT_TRUE(refused([](FlightConfig& c) { c.gaze.yaw_rate_radps = 0.0; }));
 }
 
+TEST(FlightConfig, WhatIsTooNearForAllSensorsIsTakenToBeFreeAroundTheTopOfTheClimb) {
+  const VehicleModel vehicle;  // planned with 0.9 m
+  SensorRig rig = six_cameras(96, 25.0);
+  const auto half_m = [&] {
+    FlightConfig config = sound();
+    describe_sensors(rig, config);
+    return assumed_free_half_m(vehicle, config.sees_all_around, config.level_view_ratio, config.too_near_m);
+  };
+  EXPECT_TRUE(half_m().isZero(0.0)) << "they see it";
+  for (CameraSpec& camera : rig.cameras) camera.range_min_m = 0.6;
+  EXPECT_DOUBLE_EQ(half_m().minCoeff(), 0.9 + 0.25 + 0.3) << "room for a plan";
+  for (CameraSpec& camera : rig.cameras) camera.range_min_m = 2.0;
+  rig.cameras[3].mount.x_m = -0.2;
+  EXPECT_DOUBLE_EQ(half_m().minCoeff(), 2.0 + 0.2 + 0.3) << "all that they do not see";
+  for (CameraSpec& camera : rig.cameras) camera.range_min_m = 20.0;
+  EXPECT_DOUBLE_EQ(half_m().maxCoeff(), 5.0) << "no more than somebody can answer for";
+}
+
 }  // namespace
 }  // namespace roborun::flight

@@ -85,6 +85,14 @@ TEST_F(RigFlight, ACameraBelowThatSeesNothingOnTheGroundDoesNotHoldTheTakeOff) {
   EXPECT_TRUE(r.reached_goal) << r.reason;
 }
 
+TEST_F(RigFlight, SixCamerasThatMeasureNothingNearbyLeaveTheTopOfTheirClimb) {
+  SensorRig& rig = config_.simulator.rig.emplace(six_cameras(96, 25.0));
+  for (CameraSpec& camera : rig.cameras) camera.range_min_m = 0.6;
+  const report::MissionResult r = fly("six cameras that measure from 0.6 m on");
+  EXPECT_FALSE(r.collided);
+  EXPECT_TRUE(r.reached_goal) << r.reason;
+}
+
 TEST_F(RigFlight, ARigThatCannotBeIsRefusedByName) {
   const auto refusal = [&](auto&& change) -> std::string {
     config_.simulator.rig.emplace();

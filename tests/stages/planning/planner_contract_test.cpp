@@ -312,23 +312,6 @@ TEST_F(RrtStarTest, PlanDoesNotAllocate) {
   EXPECT_EQ(scope.count(), 0U);
 }
 
-TEST_F(RrtStarTest, EscapesToTheNearestFreePlaceAndNeverThroughWhatIsOccupied) {
-  core::UnlimitedBudget unlimited;
-  PlanResult result;
-  test::BoxView wall = pillar_world();
-  wall.occupied = {{Vector3(0.5, -20, 0), Vector3(1.5, 20, 20)}};
-  PlanRequest r = request_to(Vector3(150, 0, 5));
-  r.start_W = Vector3(-0.2, 0, 5);  // 0.7 m from the wall, 0.9 are wanted
-  EXPECT_EQ(sut_.plan(r, wall, unlimited, result), Status::kStartBlocked);
-  ASSERT_EQ(result.path_W.size(), 2U);
-  EXPECT_EQ(result.path_W[0], r.start_W);
-  EXPECT_EQ(result.path_W[1], Vector3(-0.5, 0, 5)) << "the first free place in steps of a cell";
-  EXPECT_DOUBLE_EQ(result.cost_m, 0.3);
-  r.start_W = Vector3(1.0, 0, 5);
-  EXPECT_EQ(sut_.plan(r, wall, unlimited, result), Status::kStartBlocked);
-  EXPECT_TRUE(result.path_W.empty()) << "inside the wall every way out touches it";
-}
-
 TEST(FencedView, IsTheMapInsideTheFenceAndOccupiedOutside) {
   const test::BoxView map = pillar_world();
   core::Fence fence;

@@ -107,6 +107,15 @@ TEST_F(WayMemoryTest, ProvesThatThereIsNoWay) {
   EXPECT_EQ(sut_->to_goal_m(start_W_), kInfinity);
 }
 
+TEST_F(WayMemoryTest, ARoomBesideAVehicleThatStandsInNoneProvesNothing) {
+  // Around a small closed cell, and the vehicle in its wall: too near to it on both sides.
+  box(-2, -2, 2, -1.5), box(-2, 1.5, 2, 2), box(-2, -2, -1.5, 2), box(1.5, -2, 2, 2);
+  make();
+  EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath) << "inside it";
+  EXPECT_EQ(look_and_solve(Vector3(0.9, 0, 5)), Status::kStartBlocked)
+      << "0.6 m from the wall, 0.9 are its radius";
+}
+
 TEST_F(WayMemoryTest, AFenceIsAWall) {
   const std::array<core::FencePoint, 4> wall{{{10, -39}, {12, -39}, {12, 12}, {10, 12}}};
   ASSERT_EQ(config_.fence.add_polygon(core::FenceSide::kKeepOut, wall), core::FenceFault::kNone);
