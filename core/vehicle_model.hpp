@@ -18,6 +18,7 @@ namespace roborun {
 struct VehicleModel {
   double radius_m{0.6};
   double tracking_error_m{0.3};  ///< Measured in tests/platform/sitl/vehicle/closed_loop_test.cpp.
+  double slow_error_m{0.0};
   double mass_kg{4.5};
   double inertia_x_kgm2{0.080};
   double inertia_y_kgm2{0.080};
@@ -41,6 +42,7 @@ struct VehicleModel {
   double acceleration_mps2{4.0};
   double jerk_mps3{20.0};  ///< On short hops the tilt overshot by 6 degrees without it.
   double tilt_rad{0.60};   ///< 34 degrees: 6.7 m/s2 sideways.
+  double slow_speed_mps{1.0};
   double climb_mps{6.0};
   double descent_mps{6.0};
   double yaw_rate_radps{1.5};
@@ -62,15 +64,16 @@ struct VehicleKey {
   double VehicleModel::*value;
   double low, high;  ///< Both allowed.
   const char* text;
-  bool optional{false};  ///< A file may leave it out.
+  std::optional<double> left_out{};  ///< What counts if a file leaves it out; none: it must not.
 };
 
 // clang-format off
-inline constexpr std::array<VehicleKey, 26> kVehicleKeys = [] {
+inline constexpr std::array<VehicleKey, 28> kVehicleKeys = [] {
   using V = VehicleModel;
-  return std::array<VehicleKey, 26>{{
+  return std::array<VehicleKey, 28>{{
     {"body", "radius_m", &V::radius_m, 0.05, 2.0, "of the sphere around everything that must not touch, propellers included"},
     {"body", "tracking_error_m", &V::tracking_error_m, 0.02, 2.0, "largest distance from the reference in flight: added to the radius for planning"},
+    {"body", "slow_error_m", &V::slow_error_m, 0.0, 2.0, "the same at limits.slow_speed_mps or less, beside what the cameras saw: narrow places are flown so; 0: never", 0.0},
     {"body", "mass_kg", &V::mass_kg, 0.05, 100.0, "at take-off, load included"},
     {"body", "inertia_x_kgm2", &V::inertia_x_kgm2, 1e-6, 100.0, "about the forward axis"},
     {"body", "inertia_y_kgm2", &V::inertia_y_kgm2, 1e-6, 100.0, "about the left axis"},
@@ -90,11 +93,12 @@ inline constexpr std::array<VehicleKey, 26> kVehicleKeys = [] {
     {"limits", "acceleration_mps2", &V::acceleration_mps2, 0.2, 30.0, "along a whole trajectory, braking included"},
     {"limits", "jerk_mps3", &V::jerk_mps3, 1.0, 1000.0, "along a whole trajectory"},
     {"limits", "tilt_rad", &V::tilt_rad, 0.05, 1.2, "of the thrust against the vertical"},
+    {"limits", "slow_speed_mps", &V::slow_speed_mps, 0.1, 30.0, "fastest where it is narrow", 1.0},
     {"limits", "climb_mps", &V::climb_mps, 0.2, 30.0, "fastest climb"},
     {"limits", "descent_mps", &V::descent_mps, 0.2, 30.0, "fastest descent"},
     {"limits", "yaw_rate_radps", &V::yaw_rate_radps, 0.05, 10.0, "fastest turn about the vertical"},
-    {"limits", "finest_cell_m", &V::finest_cell_m, 0.05, 0.3, "edge of the map's finest cells, for the design aware: smaller ones let it through narrower gaps, and cost more", true},
-    {"limits", "thinnest_m", &V::thinnest_m, 0.005, 1.0, "the thinnest pole or wire that it must not fly into", true},
+    {"limits", "finest_cell_m", &V::finest_cell_m, 0.05, 0.3, "edge of the map's finest cells, for the design aware: smaller ones let it through narrower gaps, and cost more", kPublishedCell_m},
+    {"limits", "thinnest_m", &V::thinnest_m, 0.005, 1.0, "the thinnest pole or wire that it must not fly into", 0.02},
   }};
 }();
 // clang-format on
@@ -127,6 +131,12 @@ inline constexpr std::array<VehicleKey, 26> kVehicleKeys = [] {
 /// Distance that plans keep from everything.
 [[nodiscard]] inline double planned_radius_m(const VehicleModel& vehicle) noexcept {
   return vehicle.radius_m + vehicle.tracking_error_m;
+}
+
+/// The same where it flies at most slow_speed_mps.
+[[nodiscard]] inline double slow_radius_m(const VehicleModel& vehicle) noexcept {
+  const bool flies_slowly = vehicle.slow_error_m > 0.0 && vehicle.slow_error_m < vehicle.tracking_error_m;
+  return vehicle.radius_m + (flies_slowly ? vehicle.slow_error_m : vehicle.tracking_error_m);
 }
 
 /// What makes a vehicle that no flight is possible with, in words, or null. Precondition: out_of_bounds() is

@@ -62,4 +62,37 @@ CostProfile paper_profile() noexcept {
   return profile;
 }
 
+std::array<double, kPrecisionLevels> on_lattice(const std::array<double, kPrecisionLevels>& published,
+                                                const PrecisionLattice& lattice) noexcept {
+  constexpr PrecisionLattice kPublished{};
+  std::array<double, kPrecisionLevels> result{};
+  for (int level = 0; level < kPrecisionLevels; ++level) {
+    const double edge_m = lattice.cell_size_m(level);
+    double low_m = kPublished.finest_m, low = published[0], high = published[1];
+    if (edge_m >= low_m) {
+      const int below = std::min(kPublished.coarsest_level_within(edge_m), kPrecisionLevels - 2);
+      low_m = kPublished.cell_size_m(below);
+      low = published[static_cast<std::size_t>(below)];
+      high = published[static_cast<std::size_t>(below) + 1];
+    }
+    const double ratio = high > 0.0 ? std::max(low / high, 1.0) : 1.0;
+    for (; edge_m < low_m; low_m *= 0.5) {
+      high = low;
+      low *= ratio;
+    }
+    result[static_cast<std::size_t>(level)] = low + (high - low) * std::min(edge_m / low_m - 1.0, 1.0);
+  }
+  return result;
+}
+
+CostProfile on_lattice(const CostProfile& published, const PrecisionLattice& lattice) noexcept {
+  CostProfile result = published;
+  if (lattice.finest_m == kPublishedCell_m) return result;
+  for (StageCost& cost : result.stage) {
+    cost.fixed_s = on_lattice(cost.fixed_s, lattice);
+    cost.per_m3_s = on_lattice(cost.per_m3_s, lattice);
+  }
+  return result;
+}
+
 }  // namespace roborun::core

@@ -40,4 +40,10 @@ struct CostProfile {
 /// charged to the map, one to the export.
 [[nodiscard]] CostProfile paper_profile() noexcept;
 
+/// What is given for the published precisions, for those of a lattice: linear in the cell's edge between two of them, and
+/// below the finest from octave to octave as much more as from the second to it.
+[[nodiscard]] std::array<double, kPrecisionLevels> on_lattice(
+    const std::array<double, kPrecisionLevels>& published, const PrecisionLattice& lattice) noexcept;
+[[nodiscard]] CostProfile on_lattice(const CostProfile& published, const PrecisionLattice& lattice) noexcept;
+
 }  // namespace roborun::core

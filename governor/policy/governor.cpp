@@ -198,14 +198,15 @@ double Governor::needed_s(const Task& task, int level, double share) const noexc
 /// either side of a gap: a gap of width g loses up to four cells, so it is passable for certain on cells of
 ///   (g - width) / 4
 /// and `cells_to_obstacle` cells must fit between the vehicle and the nearest obstacle. Then the policy:
-/// coarser only step by step, finer after failures, and at most 0.6 m near the goal and on the climb.
+/// coarser only step by step, finer than 0.3 m only after failures and on narrow ways, and at most 0.6 m near the goal and on the climb.
 int Governor::asked_level(const Task& task, Decision& d) const noexcept {
   const Policy& policy = config_.policy;
   const double gap_cell_m = 0.25 * (task.profile.gap_average_m - config_.vehicle_width_m);
   d.demand_m = std::fmin(gap_cell_m, task.profile.closest_obstacle_m / policy.cells_to_obstacle);
   int level = std::min(config_.lattice.coarsest_level_within(d.demand_m), config_.coarsest_level);
   level = std::min(level, last_level_ + policy.coarser_levels_per_decision);
-  level = std::max(level - finer_levels(task.situation), 0);
+  level = std::max(level, published_level());
+  level = task.situation.narrow ? 0 : std::max(level - finer_levels(task.situation), 0);
   if (near_goal(task.situation) || task.situation.surveying)
     level = std::min(level, config_.lattice.coarsest_level_within(2.0 * kPublishedCell_m));
   return level;
@@ -248,9 +249,11 @@ double Governor::deadline_s(const Task& task, int asked_level, Decision& d) cons
 ///  c. If even the coarsest level is too slow, only a share x of the view is perceived. Latency is linear in
 ///     volume, so none + x (all - none) = deadline gives x = (deadline - none) / (all - none).
 Governor::Precision Governor::in_time(const Task& task, int asked_level, double deadline_s) const noexcept {
+  // Time alone is no reason for cells finer than the published ones.
   Precision result{0, asked_level, 1.0};
   while (result.coarsest < config_.coarsest_level && needed_s(task, result.coarsest, 1.0) > deadline_s)
     ++result.coarsest;
+  result.finest = std::min(asked_level, published_level());
   while (result.finest < result.coarsest && needed_s(task, result.finest, 1.0) > deadline_s) ++result.finest;
   const double none_s = needed_s(task, result.coarsest, 0.0);
   const double all_s = needed_s(task, result.coarsest, 1.0);

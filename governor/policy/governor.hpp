@@ -90,6 +90,10 @@ class Governor final : public DecisionPolicy {
   [[nodiscard]] Decision decide_static(const SpaceProfile& profile) const noexcept;
 
   // The steps of decide().
+  /// The coarsest level within the published finest cell: what finds nothing there, and it alone, is worth less.
+  [[nodiscard]] int published_level() const noexcept {
+    return config_.lattice.coarsest_level_within(kPublishedCell_m);
+  }
   [[nodiscard]] int asked_level(const Task& task, Decision& decision) const noexcept;
   [[nodiscard]] double deadline_s(const Task& task, int asked_level, Decision& decision) const noexcept;
   [[nodiscard]] Precision in_time(const Task& task, int asked_level, double deadline_s) const noexcept;

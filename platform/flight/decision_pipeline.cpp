@@ -18,6 +18,7 @@ constexpr double kCornerRoom_m = 0.25;
 constexpr double kAtRest_mps = 0.05;
 constexpr double kLeaving_mps = 0.5;
 constexpr double kTooFast = 1.5;
+constexpr double kSlowEnough = 1.05;  // of the slow speed: what trajectories keep to
 /// What the way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
 constexpr double kBeyond_mps = 2.0;
 
@@ -100,7 +101,8 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W}, cloud_.points(), map_.view(), budget, work);
   out.motion = motion_.moving(in.now);
   (void)profile_space(profiler, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB,
-                      in.goal_W, relevant_W, r_m, out.profile, budget, work);
+                      in.goal_W, relevant_W, is_narrow_ ? slow_radius_m(config_.vehicle) : r_m, out.profile,
+                      budget, work);
   out.profile.sensor_volume_m3 = cloud_.seen_volume_m3();
   // What the map will hold once this decision's images are in it.
   out.profile.map_volume_m3 = map_.known_volume_m3() + cloud_.seen_volume_m3();
@@ -108,8 +110,8 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
 }
 
 void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noexcept {
-  out.decision =
-      policy_.decide(out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing, out.motion});
+  out.decision = policy_.decide(
+      out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing, out.motion, is_narrow_});
   if (out.decision.predicted_s[core::StageId::kGovernor] > 0.0) charge(core::StageId::kGovernor, {}, out);
 }
 
@@ -196,14 +198,14 @@ void DecisionPipeline::export_map(const DecisionInput& in, DecisionOutput& out) 
   charge(core::StageId::kExport, exported, out);
 }
 
-void DecisionPipeline::search(const DecisionInput& in, double room_m, DecisionOutput& out) noexcept {
+void DecisionPipeline::search(const DecisionInput& in, double radius_m, DecisionOutput& out) noexcept {
   const stages::FencedView fenced(map_.view(), config_.fence);
   const stages::MapView& view = config_.fence.empty() ? map_.view() : fenced;
   stages::PlanRequest request;
   request.start_W = draft_.start.p_W;
   request.goal_W = in.goal_W;
   request.bounds_W = config_.flight_bounds_W;
-  request.radius_m = radius_m() + room_m;
+  request.radius_m = radius_m;
   request.volume_m3 = std::max(out.decision.point.v2_m3 - draft_.planner_work.volume_m3, 0.0);
   request.horizon_m = config_.horizon_m;
   request.kept_W = kept_W_;
@@ -217,7 +219,8 @@ void DecisionPipeline::search(const DecisionInput& in, double room_m, DecisionOu
   kept_W_ = planned.path_W;
 }
 
-void DecisionPipeline::fit(core::StageBudget& budget, DecisionOutput& out) noexcept {
+void DecisionPipeline::fit(core::StageBudget& budget, double radius_m, double speed_mps,
+                           DecisionOutput& out) noexcept {
   if (kept_W_.size() < 2) return;
   const stages::FencedView fenced(map_.view(), config_.fence);
   const stages::MapView& view = config_.fence.empty() ? map_.view() : fenced;
@@ -225,8 +228,8 @@ void DecisionPipeline::fit(core::StageBudget& budget, DecisionOutput& out) noexc
   request.path_W = {kept_W_.begin(), kept_W_.size()};
   request.start = draft_.start;
   request.start_time = draft_.takes_over;
-  request.limits = limits(out.decision.point.speed_limit_mps);
-  request.radius_m = radius_m();
+  request.limits = limits(speed_mps);
+  request.radius_m = radius_m;
   meter_.charge_to(core::StageId::kSmoother);
   stages::SmoothResult smoothed;
   out.smoother_status = smoother_.smooth(request, view, budget, smoothed);
@@ -261,7 +264,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   draft_.start = in.committed->at(draft_.takes_over);
   draft_.planner_work = out.work[core::StageId::kPlanner];
   draft_.smoother_work = {};
-  draft_.leaves = false;
+  draft_.leaves = draft_.is_narrow = false;
   const Known known(*this, in);
   draft_.committed_until_s =
       free_until_s(known.view(), *in.committed, seconds(in.now - in.committed->start_time),
@@ -269,7 +272,9 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   draft_.planner_work.level = out.decision.point.p1_level;
   draft_.planner_budget.emplace(budget_of(core::StageId::kPlanner, out));
   remember(in, out);
-  search(in, kCornerRoom_m, out);
+  // Searches that find nothing may take all the time that there is: every other one begins with the narrow room.
+  draft_.is_narrow = failures_ % 2 == 1 && may_squeeze();
+  search(in, draft_.is_narrow ? slow_radius_m(config_.vehicle) : radius_m() + kCornerRoom_m, out);
 }
 
 void DecisionPipeline::remember(const DecisionInput& in, DecisionOutput& out) noexcept {
@@ -293,16 +298,7 @@ double DecisionPipeline::arrival_s(const Trajectory& trajectory, const DecisionI
 void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noexcept {
   if (draft_.begun) {
     core::MeteredBudget budget = table_budget_of(core::StageId::kSmoother);
-    // First with room for the smoother to cut corners, then as tight as the vehicle can fly: too tight for
-    // extra room is no reason to flee.
-    if (out.planner_status != Status::kStartBlocked) fit(budget, out);
-    if (out.smoother_status != Status::kOk) {
-      search(in, 0.0, out);
-      if (out.planner_status == Status::kStartBlocked)
-        leave(budget, out);
-      else
-        fit(budget, out);
-    }
+    find_trajectory(in, budget, out);
     charge(core::StageId::kPlanner, draft_.planner_work, out);
     charge(core::StageId::kSmoother, draft_.smoother_work, out);
     choose(in, out);
@@ -312,6 +308,43 @@ void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noex
     policy_.observe(stage, out.decision.predicted_s[i], seconds(out.cost[i]));
   }
   failures_ = out.smoother_status == Status::kOk || in.climbing ? 0 : failures_ + 1;
+}
+
+bool DecisionPipeline::may_squeeze() const noexcept {
+  const VehicleModel& vehicle = config_.vehicle;
+  return slow_radius_m(vehicle) < radius_m() &&
+         draft_.start.v_W.norm() <= kSlowEnough * vehicle.slow_speed_mps;
+}
+
+void DecisionPipeline::fit_narrow(core::StageBudget& budget, DecisionOutput& out) noexcept {
+  const VehicleModel& vehicle = config_.vehicle;
+  if (out.planner_status == Status::kStartBlocked) return leave(budget, out);
+  fit(budget, slow_radius_m(vehicle), std::min(out.decision.point.speed_limit_mps, vehicle.slow_speed_mps),
+      out);
+  draft_.is_narrow = out.smoother_status == Status::kOk;
+}
+
+void DecisionPipeline::find_trajectory(const DecisionInput& in, core::StageBudget& budget,
+                                       DecisionOutput& out) noexcept {
+  const double speed_mps = out.decision.point.speed_limit_mps;
+  const bool may_be_narrow = may_squeeze(), was_narrow = draft_.is_narrow;
+  const auto is_found = [&out] { return out.smoother_status == Status::kOk; };
+  // First with room for the smoother to cut corners, then as tight as the vehicle can fly: too tight for
+  // extra room is no reason to flee. Where it is narrower still, slowly.
+  if (was_narrow) {
+    fit_narrow(budget, out);
+  } else if (out.planner_status != Status::kStartBlocked) {
+    fit(budget, radius_m(), speed_mps, out);
+  }
+  if (is_found()) return;
+  search(in, radius_m(), out);
+  if (out.planner_status != Status::kStartBlocked)
+    fit(budget, radius_m(), speed_mps, out);
+  else if (!may_be_narrow)
+    leave(budget, out);
+  if (is_found() || was_narrow || !may_be_narrow) return;
+  search(in, slow_radius_m(config_.vehicle), out);
+  fit_narrow(budget, out);
 }
 
 void DecisionPipeline::choose(const DecisionInput& in, DecisionOutput& out) noexcept {
@@ -325,6 +358,7 @@ void DecisionPipeline::choose(const DecisionInput& in, DecisionOutput& out) noex
                      arrival_s(*in.committed, in) <= arrival_s(draft_.trajectory, in);
   if (has_new && !keeps) {
     has_planned_ = true;
+    is_narrow_ = draft_.is_narrow;
     if (draft_.leaves) leaves_at_ = draft_.trajectory.start_time;
     out.kind = DecisionKind::kNew;
     out.trajectory = draft_.trajectory;

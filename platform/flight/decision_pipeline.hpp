@@ -124,7 +124,8 @@ class DecisionPipeline {
     std::optional<core::MeteredBudget> planner_budget{};
     core::Work planner_work{}, smoother_work{};
     Trajectory trajectory{};
-    bool leaves{};  ///< The trajectory leaves a place without room.
+    bool is_narrow{};  ///< With the room of slow flight.
+    bool leaves{};     ///< The trajectory leaves a place without room.
   };
 
   void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
@@ -147,10 +148,16 @@ class DecisionPipeline {
   void remember(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// When the vehicle would be at the goal, counted from in.now.
   [[nodiscard]] double arrival_s(const Trajectory& trajectory, const DecisionInput& in) const noexcept;
-  /// One search, with so much room around the vehicle; the path goes to kept_W_.
-  void search(const DecisionInput& in, double room_m, DecisionOutput& out) noexcept;
+  /// One search, with this radius kept free; the path goes to kept_W_.
+  void search(const DecisionInput& in, double radius_m, DecisionOutput& out) noexcept;
   /// The path of the last search as a trajectory.
-  void fit(core::StageBudget& budget, DecisionOutput& out) noexcept;
+  void fit(core::StageBudget& budget, double radius_m, double speed_mps, DecisionOutput& out) noexcept;
+  /// Slow enough for the room of slow flight, if that is less.
+  [[nodiscard]] bool may_squeeze() const noexcept;
+  /// The path of the last search, slowly and with the room that this takes.
+  void fit_narrow(core::StageBudget& budget, DecisionOutput& out) noexcept;
+  /// From the search of plan() on, with less and less room.
+  void find_trajectory(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// From rest, out of where no search has room: slowly, with the vehicle's own radius.
   void leave(core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// Between the new trajectory, what is flown, and a stop.
@@ -175,7 +182,8 @@ class DecisionPipeline {
   MonotonicTime leaves_at_ =
       MonotonicTime::min();  ///< Start of the last trajectory that leaves a place without room.
   Draft draft_;
-  int failures_{0};  ///< Decisions in a row without a trajectory.
+  bool is_narrow_{false};  ///< What is flown was planned so.
+  int failures_{0};        ///< Decisions in a row without a trajectory.
 };
 
 }  // namespace roborun::flight

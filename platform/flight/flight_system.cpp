@@ -15,6 +15,8 @@ PipelineConfig pipeline_config(const FlightConfig& config) noexcept {
   PipelineConfig pipeline;
   pipeline.flight_bounds_W = config.bounds_W;
   pipeline.vehicle = config.vehicle;
+  // The published designs know one room.
+  if (config.design != governor::Design::kAware) pipeline.vehicle.slow_error_m = 0.0;
   pipeline.map_bounds_W = map_bounds_W(config);
   pipeline.level_view_ratio = config.level_view_ratio;
   pipeline.sees_all_around = config.sees_all_around;
@@ -27,7 +29,15 @@ PipelineConfig pipeline_config(const FlightConfig& config) noexcept {
 }
 
 stages::WayMemory::Config way_config(const FlightConfig& config) noexcept {
-  return {config.bounds_W, planned_radius_m(config.vehicle), lattice_of(config).finest_m, config.fence};
+  using stages::WayMemory;
+  WayMemory::Config ways{config.bounds_W, slow_radius_m(config.vehicle), lattice_of(config).finest_m,
+                         config.fence};
+  // A large world in larger cells: its surfaces would take more blocks than there are.
+  constexpr double kPositionsPerBlock = 8.0;
+  const bool is_large =
+      WayMemory::positions(ways) > kPositionsPerBlock * static_cast<double>(ways.max_blocks);
+  if (is_large && ways.finest_m < kPublishedCell_m) ways.finest_m *= 2.0;
+  return ways;
 }
 
 /// The published designs know their horizon alone.

@@ -82,10 +82,10 @@ double quantile(std::vector<double> values, double q) {
   return values[static_cast<std::size_t>(std::ceil(at))];
 }
 
-std::vector<core::CostProfile> prices_of(const MissionConfig& config) {
-  std::vector<core::CostProfile> prices{config.flight.costs};
+std::vector<core::CostProfile> prices_of(const MissionConfig& config, const flight::FlightConfig& flight) {
+  std::vector<core::CostProfile> prices{flight.costs};
   for (core::StageCost& cost : prices.front().stage) cost = core::slower(cost, 1.0 / config.host_factor);
-  if (config.host_costs) prices.push_back(*config.host_costs);
+  if (config.host_costs) prices.push_back(core::on_lattice(*config.host_costs, lattice_of(flight)));
   return prices;
 }
 
@@ -176,7 +176,7 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
                     : std::make_unique<FlightRecorder>(config.record, flight_config_, config, aircraft_,
                                                        cameras_, rig_.lidars())),
       setup_(flight_config_, config.backends, image_limits(config), config.own),
-      prices_(prices_of(config)),
+      prices_(prices_of(config, flight_config_)),
       timed_map_(setup_.parts().map, prices_),
       timed_planner_(setup_.parts().planner, prices_),
       planner_(timed_planner_, faults_.line()),

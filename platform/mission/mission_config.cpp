@@ -40,6 +40,12 @@ flight::FlightConfig flight_config_of(const sitl::World& world, const MissionCon
   if (const std::string why = sitl::why_no_room(world, flight.vehicle.radius_m); !why.empty())
     throw InputError(why);
   flight.seed = config.seed;
+  const PrecisionLattice lattice = lattice_of(flight);
+  flight.costs = core::on_lattice(flight.costs, lattice);
+  if (lattice.finest_m != kPublishedCell_m) {
+    for (governor::LatencyModel& model : flight.model)
+      model = {core::on_lattice(model.fixed_s, lattice), core::on_lattice(model.slope_s_per_m3, lattice)};
+  }
   return flight;
 }
 

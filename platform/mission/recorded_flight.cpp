@@ -83,8 +83,9 @@ Vector3 place(const Json& json, const char* key) {
 VehicleModel read_vehicle(const Json& json) {
   VehicleModel vehicle;
   for (const VehicleKey& key : kVehicleKeys)
-    if (!key.optional || json.at(key.table).contains(key.key))
-      vehicle.*key.value = number(json.at(key.table), key.key, key.low, key.high);
+    vehicle.*key.value = key.left_out && !json.at(key.table).contains(key.key)
+                             ? *key.left_out
+                             : number(json.at(key.table), key.key, key.low, key.high);
   vehicle.measured_stopping.reset();
   if (json.contains("stopping")) {
     const Json& stopping = json.at("stopping");

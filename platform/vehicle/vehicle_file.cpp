@@ -106,7 +106,8 @@ class VehicleReader {
   void read_model(VehicleModel& model) const {
     for (const VehicleKey& key : kVehicleKeys) {
       const toml::table& from = table(key.table);
-      if (key.optional && from.get(key.key) == nullptr) continue;
+      model.*key.value = key.left_out.value_or(model.*key.value);
+      if (key.left_out && from.get(key.key) == nullptr) continue;
       const toml::node& node = reader_.need(from, key.key, fmt::format("[{}]", key.table));
       model.*key.value = reader_.number(node, key.key, key.low, key.high);
     }
@@ -257,8 +258,8 @@ std::vector<input::KeyText> vehicle_keys() {
   keys.reserve(kVehicleKeys.size() + kCameraKeys.size() + kLidarKeys.size());
   const VehicleModel defaults;
   for (const VehicleKey& key : kVehicleKeys)
-    keys.push_back({key.table, key.key, key.low, key.high, defaults.*key.value,
-                    std::string(key.text) + (key.optional ? "; may be left out" : "")});
+    keys.push_back({key.table, key.key, key.low, key.high, key.left_out.value_or(defaults.*key.value),
+                    std::string(key.text) + (key.left_out ? "; may be left out" : "")});
   const auto add = [&keys](const char* table, const auto& sensor) {
     for (const auto& key : keys_of(sensor))
       keys.push_back({table, key.key, key.low, key.high, key.get(sensor), key.text});

@@ -33,6 +33,64 @@ BlockContent read_cell_by_cell(const MapView& view, const Vector3& corner_W, dou
   return free + occupied == 0 ? BlockContent::kUnknown : BlockContent::kMixed;
 }
 
+namespace {
+
+/// Pairs of bits as one: both set, or (kAny) one of them.
+template <bool kAny>
+std::uint16_t halved(unsigned row) noexcept {
+  unsigned pairs = (kAny ? row | row >> 1U : row & row >> 1U) & 0x5555U;
+  pairs = (pairs | pairs >> 1U) & 0x3333U;
+  pairs = (pairs | pairs >> 2U) & 0x0F0FU;
+  return static_cast<std::uint16_t>((pairs | pairs >> 4U) & 0x00FFU);
+}
+
+/// One of the eight blocks of an eighth's size, into its place.
+void merge_eighth(const CellBlock& fine, std::size_t eighth, CellBlock& cells) noexcept {
+  constexpr std::size_t kHalf = kBlockCells / 2;
+  const unsigned shift = (eighth & 1U) != 0 ? kHalf : 0U;
+  for (std::size_t z = 0; z < kHalf; ++z) {
+    for (std::size_t y = 0; y < kHalf; ++y) {
+      const std::size_t at = 2 * z * kBlockCells + 2 * y, above = at + kBlockCells;
+      const auto& f = fine.free;
+      const auto& o = fine.occupied;
+      const unsigned all = unsigned{f[at]} & f[at + 1] & f[above] & f[above + 1];
+      const unsigned any = unsigned{o[at]} | o[at + 1] | o[above] | o[above + 1];
+      const std::size_t to =
+          (z + ((eighth & 4U) != 0 ? kHalf : 0)) * kBlockCells + y + ((eighth & 2U) != 0 ? kHalf : 0);
+      cells.free[to] = static_cast<std::uint16_t>(cells.free[to] | halved<false>(all) << shift);
+      cells.occupied[to] = static_cast<std::uint16_t>(cells.occupied[to] | halved<true>(any) << shift);
+    }
+  }
+}
+
+}  // namespace
+
+BlockContent read_blocks(const MapView& view, const Vector3& corner_W, double cell_m, CellBlock& cells,
+                         std::uint64_t& lookups) noexcept {
+  if (cell_m != 2.0 * view.finest_m()) return view.read(corner_W, cell_m, cells, lookups);
+  cells = {};
+  std::size_t free = 0, unknown = 0;
+  CellBlock fine;
+  for (std::size_t eighth = 0; eighth < 8; ++eighth) {
+    const Vector3 offset((eighth & 1U) != 0 ? 1.0 : 0.0, (eighth & 2U) != 0 ? 1.0 : 0.0,
+                         (eighth & 4U) != 0 ? 1.0 : 0.0);
+    const BlockContent content =
+        view.read(corner_W + block_m(0.5 * cell_m) * offset, 0.5 * cell_m, fine, lookups);
+    if (content == BlockContent::kUnknown) {
+      ++unknown;
+      continue;
+    }
+    if (content == BlockContent::kFree) {
+      ++free;
+      fine.free.fill(0xFFFF);
+      fine.occupied.fill(0);
+    }
+    merge_eighth(fine, eighth, cells);
+  }
+  if (free == 8) return BlockContent::kFree;
+  return unknown == 8 ? BlockContent::kUnknown : BlockContent::kMixed;
+}
+
 bool is_segment_free(const MapView& view, const Vector3& a_W, const Vector3& b_W, double radius_m,
                      std::uint64_t& lookups) noexcept {
   const double length_m = (b_W - a_W).norm();

@@ -42,6 +42,10 @@ class MapView {
   }
 };
 
+/// The same in cells of finest_m() or of twice that: of those free if all eight in them are, occupied if one is.
+[[nodiscard]] BlockContent read_blocks(const MapView& view, const Vector3& corner_W, double cell_m,
+                                       CellBlock& cells, std::uint64_t& lookups) noexcept;
+
 /// is_free_at_finest() of another view, which must outlive it, in the place of is_free().
 class FinestView final : public MapView {
  public:

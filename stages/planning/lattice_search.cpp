@@ -19,6 +19,7 @@ constexpr std::uint64_t kWeight = 2;  // of what is left
 constexpr unsigned kIndexBits = 24;
 constexpr std::uint32_t kPollEvery = 64;
 constexpr double kPhase_m = 1e-6;
+constexpr double kAroundNarrow_m = 2.0;
 constexpr int kLongestRun = 1024;
 
 std::uint32_t units(double length_m) noexcept {
@@ -41,11 +42,30 @@ LatticeSearch::LatticeSearch(std::size_t max_nodes, core::Arena& arena) noexcept
 bool LatticeSearch::lay_out(const PlanRequest& request, double finest_m, int cells) noexcept {
   step_m_ = cells * finest_m;
   if (cells > 1 && step_m_ > 2.0 * request.radius_m) return false;
+  // Of the finest cells so many as there is room for, around the start.
+  const double to_goal_m = (request.goal_W - request.start_W).cwiseAbs().maxCoeff();
+  double reach_m = request.horizon_m;
+  // Cells below the published ones are for what is narrow and near.
+  if (step_m_ < kPublishedCell_m) reach_m = std::fmin(reach_m, 1.5 * to_goal_m + kAroundNarrow_m);
+  while (!fit(request, finest_m, reach_m)) {
+    reach_m *= 0.75;
+    if (cells > 1 || !(reach_m > to_goal_m)) return false;
+  }
+  const auto nodes = static_cast<std::size_t>(size_.z * size_.y * size_.x);
+  std::fill_n(state_.begin(), nodes, std::uint8_t{0});
+  for (Side& side : side_) side.opened.clear();
+  side_[0].from_W = side_[1].to_W = request.start_W;
+  side_[1].from_W = side_[0].to_W = request.goal_W;
+  overflown_ = false;
+  return true;
+}
+
+bool LatticeSearch::fit(const PlanRequest& request, double finest_m, double reach_m) noexcept {
   std::array<std::int32_t, 3> count{};
   double nodes = 1.0;
   for (int i = 0; i < 3; ++i) {
-    const double low = std::fmax(request.bounds_W.min_W[i], request.start_W[i] - request.horizon_m);
-    const double high = std::fmin(request.bounds_W.max_W[i], request.start_W[i] + request.horizon_m);
+    const double low = std::fmax(request.bounds_W.min_W[i], request.start_W[i] - reach_m);
+    const double high = std::fmin(request.bounds_W.max_W[i], request.start_W[i] + reach_m);
     // The low side of the box just inside a cell.
     const double phase = request.radius_m + kPhase_m;
     corner_W_[i] = std::ceil((low - phase) / finest_m) * finest_m + phase;
@@ -58,11 +78,6 @@ bool LatticeSearch::lay_out(const PlanRequest& request, double finest_m, int cel
   size_ = {count[0], count[1], count[2]};
   state_pool_.use(static_cast<std::size_t>(nodes));
   cost_pool_.use(static_cast<std::size_t>(nodes));
-  std::fill_n(state_.begin(), static_cast<std::size_t>(nodes), std::uint8_t{0});
-  for (Side& side : side_) side.opened.clear();
-  side_[0].from_W = side_[1].to_W = request.start_W;
-  side_[1].from_W = side_[0].to_W = request.goal_W;
-  overflown_ = false;
   return true;
 }
 

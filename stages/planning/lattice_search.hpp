@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/memory/least_first.hpp"
+#include "core/precision.hpp"
 #include "stages/planning/planner.hpp"
 
 namespace roborun::stages {
@@ -14,7 +15,8 @@ namespace roborun::stages {
 /// Nodes lie a step apart, where a box of the vehicle's radius touches as few cells as it can. A node is free if the box
 /// around it is; moves go along the axes: the boxes at their two ends cover what the vehicle sweeps, for steps of up to
 /// two radii. (Where all corners of a diagonal move are free, moves along axes lead there, too.) A coarse lattice misses
-/// what is narrow; the last one is that of the finest cells, and complete but for its window and memory.
+/// what is narrow; the last one is that of the finest cells, and complete but for its memory: where that is too little, within a window
+/// around the start.
 /// Source: Pohl, "Bi-directional search" (1971), and for the weight "Heuristic search viewed as path finding" (1970).
 class LatticeSearch {
  public:
@@ -32,7 +34,7 @@ class LatticeSearch {
 
  private:
   static constexpr std::size_t kHeap = 1U << 18U;
-  static constexpr std::array<int, 4> kSteps{6, 4, 2, 1};  ///< Finest cells.
+  static constexpr std::array<int, 6> kSteps{12, 8, 6, 4, 2, 1};  ///< Finest cells.
   struct Cell {
     std::int32_t x, y, z;
   };
@@ -50,6 +52,8 @@ class LatticeSearch {
 
   /// False if the lattice of this step does not fit.
   [[nodiscard]] bool lay_out(const PlanRequest& request, double finest_m, int cells) noexcept;
+  /// False if the nodes within `reach_m` of the start are too many, or none.
+  [[nodiscard]] bool fit(const PlanRequest& request, double finest_m, double reach_m) noexcept;
   void seed(const Task& task, int side) noexcept;
   [[nodiscard]] Status run(const Task& task) noexcept;
   /// Closes the most promising node of a side; true if it met the other one.

@@ -307,7 +307,9 @@ bool RrtStar::follow_ways(Search& s, const MapView& map, double below_m, PlanRes
   // What is known may be farther away than sensors reach.
   const double reach_m = std::fmax(s.request.horizon_m, kKnownReach_m);
   const std::size_t count = s.request.ways->known_way(s.request.start_W, reach_m - 1.0, way_W);
-  for (std::size_t i = count; i-- > 0;) {
+  // Where no path leads to, none leads to what lies behind: half of the rest is tried next.
+  for (std::size_t next = count; next > 0;) {
+    const std::size_t i = --next;
     const double rest_m = kUnknownWeight * s.request.ways->to_goal_m(way_W[i]);
     if ((way_W[i] - s.request.start_W).norm() < 1.0 ||
         !((way_W[i] - s.request.start_W).norm() + rest_m < below_m))
@@ -320,9 +322,12 @@ bool RrtStar::follow_ways(Search& s, const MapView& map, double below_m, PlanRes
     clear(to_it);
     PlanResult found;
     found.work = {};
-    const Status status = connect(to_it, found);
-    if ((status != Status::kOk && status != Status::kBudgetSpent) || !(found.cost_m + rest_m < below_m))
+    (void)connect(to_it, found);
+    if (found.path_W.size() < 2) {
+      next /= 2;
       continue;
+    }
+    if (!(found.cost_m + rest_m < below_m)) continue;
     result.path_W = found.path_W;
     result.cost_m = found.cost_m;
     return true;

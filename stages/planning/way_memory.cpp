@@ -75,8 +75,10 @@ Extent extent_of(const WayMemory::Config& config) noexcept {
 
 }  // namespace
 
+double WayMemory::positions(const Config& config) noexcept { return extent_of(config).blocks; }
+
 bool WayMemory::fits(const Config& config) noexcept {
-  return extent_of(config).blocks <= static_cast<double>(kMaxPositions);
+  return positions(config) <= static_cast<double>(kMaxPositions);
 }
 
 std::size_t WayMemory::arena_bytes(const Config& config) noexcept {
@@ -143,6 +145,8 @@ unsigned WayMemory::room_at(std::int32_t kind, const Cell& inside) const noexcep
 bool WayMemory::nearest_room(const Vector3& p_W, Cell& place) const noexcept {
   if (!is_finite(p_W) || !(p_W.cwiseAbs().maxCoeff() < kMost_m)) return false;
   const Cell at = place_of(p_W);
+  place = at;
+  if (is_known_room(room_at(at))) return true;
   int best = 1000;
   for (std::int32_t dz = -2; dz <= 2; ++dz) {
     for (std::int32_t dy = -2; dy <= 2; ++dy) {
@@ -196,7 +200,7 @@ bool WayMemory::read_window(const MapView& map, const Cell& low, const Cell& hig
             config_.finest_m *
             Vector3(corner_.x + kBlockCells * x, corner_.y + kBlockCells * y, corner_.z + kBlockCells * z);
         Seen& seen = window_[i];
-        seen.content = map.read(corner_W, config_.finest_m, seen.cells, work.units);
+        seen.content = read_blocks(map, corner_W, config_.finest_m, seen.cells, work.units);
         seen.digest = seen.content == BlockContent::kMixed ? digest_of(seen.cells)
                                                            : static_cast<std::uint64_t>(seen.content);
       }

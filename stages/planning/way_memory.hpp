@@ -17,10 +17,10 @@
 
 namespace roborun::stages {
 
-/// Space is divided into blocks of 16 finest cells an edge, and the places of a vehicle inside each into rooms: connected places that are
+/// Space is divided into blocks of 16 cells an edge, and the places of a vehicle inside each into rooms: connected places that are
 /// known to be free, or that may be. Doors join rooms of neighbouring blocks, and known with open ones. What was seen
 /// stays, whatever the map gives up. The search runs from the goal over rooms, known space at its length and open space
-/// at kUnknownWeight times its length, until it comes to the vehicle. Exact in what is connected (at the finest cells), coarse in
+/// at kUnknownWeight times its length, until it comes to the vehicle. Exact in what is connected (for whole cells), coarse in
 /// lengths. Source: Dijkstra (1959), over the regions of Botea, Mueller, Schaeffer, "Near optimal hierarchical
 /// path-finding" (2004).
 class WayMemory {
@@ -28,10 +28,12 @@ class WayMemory {
   struct Config {
     Aabb bounds_W{};  ///< The vehicle's centre stays inside.
     double radius_m{0.85};
-    double finest_m{kPublishedCell_m};  ///< Edge of the cells of the map.
+    double finest_m{kPublishedCell_m};  ///< Edge of its cells: the map's finest, or twice that.
     core::Fence fence{};
     std::size_t max_blocks{9100};  ///< That are neither free all over nor unknown all over.
   };
+  /// Blocks of the world.
+  [[nodiscard]] static double positions(const Config& config) noexcept;
   /// False for worlds of more than 262,144 blocks.
   [[nodiscard]] static bool fits(const Config& config) noexcept;
   [[nodiscard]] static std::size_t arena_bytes(const Config& config) noexcept;

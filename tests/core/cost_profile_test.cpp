@@ -31,5 +31,16 @@ TEST(CostProfile, ClampsLevelsAndNegativeWork) {
   EXPECT_EQ(cost_s(StageId::kMap, -1e9, 0), cost_s(StageId::kMap, 0.0, 0));
 }
 
+TEST(CostProfile, OnHalfTheCellsIsOneLevelOffAndGrowsBelow) {
+  const std::array<double, kPrecisionLevels> published{8.0, 2.0, 1.0, 0.5, 0.5, 0.25};
+  const auto half = on_lattice(published, {0.15});
+  EXPECT_EQ(half, (std::array<double, kPrecisionLevels>{32.0, 8.0, 2.0, 1.0, 0.5, 0.5}));
+  EXPECT_EQ(on_lattice(published, {}), published);
+  const auto third = on_lattice(published, {0.1});
+  EXPECT_GT(third[0], half[0]);
+  EXPECT_GT(third[1], half[1]) << "0.2 m";
+  EXPECT_LT(third[1], half[0]);
+}
+
 }  // namespace
 }  // namespace roborun::core

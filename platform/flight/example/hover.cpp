@@ -21,6 +21,7 @@ int main() {
   // 2. All memory, taken once. A map that finds no room in the arena has no bricks: ask before the start.
   stages::BrickMap::Config map_config;
   map_config.bounds_W = flight::map_bounds_W(config);
+  map_config.lattice = flight::lattice_of(config);
   const stages::RrtStar::Config planner_config;
   std::vector<std::byte> block(flight::FlightSystem::arena_bytes(config) +
                                stages::BrickMap::arena_bytes(map_config) +

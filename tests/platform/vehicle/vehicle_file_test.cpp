@@ -169,7 +169,7 @@ TEST(VehicleFile, NothingAboutAVehicleIsAssumed) {
   const std::string x500 = kShippedVehicles[1].text;
   ASSERT_EQ(refusal(x500), "");
   for (const VehicleKey& key : kVehicleKeys) {
-    if (key.optional) continue;
+    if (key.left_out) continue;
     const std::string line = std::string("\n") + key.key + " = ";
     const std::string said = refusal(replaced(x500, line, "\n#"));
     EXPECT_NE(said.find(key.key), std::string::npos) << said;

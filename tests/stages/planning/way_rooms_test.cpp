@@ -6,6 +6,7 @@
 
 #include "core/random/counter_rng.hpp"
 #include "stages/perception/map_view.hpp"
+#include "tests/support/box_view.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -113,6 +114,29 @@ TEST(WayRooms, AreTheConnectedPlacesOfOneKind) {
       }
       EXPECT_EQ(reached, all) << "room " << room << " of seed " << seed;
     }
+  }
+}
+
+TEST(ReadBlocks, InDoubledCellsFreeNeedsAllEightAndOccupiedOne) {
+  test::BoxView view;
+  view.free_W = {Vector3(-1.0, 1.1, -0.5), Vector3(7.0, 20.0, 9.0)};
+  view.occupied = {{Vector3(3.1, 2.0, 1.0), Vector3(3.2, 4.0, 2.6)},
+                   {Vector3(6.1, 8.5, 7.0), Vector3(6.9, 9.0, 7.2)}};
+  CellBlock cells;
+  std::uint64_t lookups = 0;
+  ASSERT_EQ(read_blocks(view, Vector3::Zero(), 0.6, cells, lookups), BlockContent::kMixed);
+  for (int i = 0; i < 4096; ++i) {
+    const int x = i % 16, y = i / 16 % 16, z = i / 256;
+    bool free = true, occupied = false;
+    for (int k = 0; k < 8; ++k) {
+      const Vector3 p_W =
+          0.3 * Vector3(2 * x + (k & 1) + 0.5, 2 * y + (k >> 1 & 1) + 0.5, 2 * z + (k >> 2) + 0.5);
+      free = free && view.at(p_W, lookups) == CellState::kFree;
+      occupied = occupied || view.at(p_W, lookups) == CellState::kOccupied;
+    }
+    const auto row = static_cast<std::size_t>(16 * z + y), column = static_cast<std::size_t>(x);
+    ASSERT_EQ(bit(cells.free, row, column), free) << x << ' ' << y << ' ' << z;
+    ASSERT_EQ(bit(cells.occupied, row, column), occupied) << x << ' ' << y << ' ' << z;
   }
 }
 
