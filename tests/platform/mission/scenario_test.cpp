@@ -55,7 +55,7 @@ TEST(ScenarioFile, RefusesWithFileLineKeyAndWhatWouldBeRight) {
       {kHead + "[expect]\noutcome = \"crash\"\n", ":5: outcome: 'crash' must be one of reached_goal, landed"},
       {kHead + "[expect]\noutcome = 3\n", ":5: outcome: must be a text in quotes"},
       {fault + "component = \"radar\"\nkind = \"off\"\n" + kTail,
-       ":5: component: 'radar' must be one of imu, gnss, barometer"},
+       ":5: component: 'radar' must be one of imu, gnss, odometry, barometer"},
       {fault + "component = \"gnss\"\nkind = \"on\"\n" + kTail,
        ":6: kind: 'on' must be one of off, stuck, garbage, wrong, slow, delayed, intermittent"},
       {fault + "component = \"esc\"\nkind = \"off\"\ninstance = 4\n" + kTail,
