@@ -75,7 +75,8 @@ TEST_F(OwnPartsTest, MapAndPlannerFromFactoriesFlyAsThoseByName) {
   const report::MissionResult by_name = fly_mission(world_, config_, {}).result;
   config_.backends = {};
   config_.own.map = [](const board::PartRequest& r) {
-    return stages::make_octomap_backend({r.map_bounds_W, r.images.vehicle_radius_m, r.images.lattice, r.images.range_m + 5.0});
+    return stages::make_octomap_backend(
+        {r.map_bounds_W, r.images.vehicle_radius_m, r.images.lattice, r.images.range_m + 5.0});
   };
   config_.own.planner = [](const board::PartRequest&) { return stages::make_ompl_planner("RRTstar", {}); };
   const report::MissionResult own = fly_mission(world_, config_, {}).result;
