@@ -9,7 +9,7 @@ namespace roborun::dataset {
 namespace {
 
 constexpr double kSigmas = 3.0;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kFarthest = std::numeric_limits<double>::infinity();
 
 double ratio(std::uint64_t part, std::uint64_t whole) noexcept {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole)
@@ -50,8 +50,8 @@ class Image {
 
   enum class Says { kNothing, kShown, kPassed };
   [[nodiscard]] Says of_cell(const Vector3& center_W, double cell_m) const {
-    double near_m = kInfinity, far_m = -kInfinity, left = kInfinity, right = -kInfinity, top = kInfinity,
-           bottom = -kInfinity;
+    double near_m = kFarthest, far_m = -kFarthest, left = kFarthest, right = -kFarthest, top = kFarthest,
+           bottom = -kFarthest;
     for (int corner = 0; corner < 8; ++corner) {
       const Vector3 aside =
           cell_m * Vector3((corner & 1) - 0.5, ((corner >> 1) & 1) - 0.5, (corner >> 2) - 0.5);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
+#include "stages/control/yaw.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -42,11 +43,6 @@ bool has_heading(const firmware_if::GnssFix& fix) noexcept {
 
 double largest_sigma_m(const firmware_if::GnssFix& fix) noexcept {
   return std::fmax(fix.sigma_horizontal_m, fix.sigma_vertical_m);
-}
-
-double yaw_of(const Quaternion& q) noexcept {
-  const Matrix3 R = q.toRotationMatrix();
-  return core::atan2(R(1, 0), R(0, 0));
 }
 
 }  // namespace

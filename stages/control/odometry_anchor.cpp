@@ -3,18 +3,14 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
+#include "stages/control/yaw.hpp"
 
 namespace roborun::stages {
 namespace {
 
 constexpr double kLengthTolerance = 0.01;
 
-double yaw_of(const Quaternion& q) noexcept {
-  const Matrix3 R = q.toRotationMatrix();
-  return core::atan2(R(1, 0), R(0, 0));
-}
-
-bool is_sigma(double sigma) noexcept { return sigma > 0.0 && std::isfinite(sigma); }
+bool is_spread(double sigma) noexcept { return sigma > 0.0 && std::isfinite(sigma); }
 
 }  // namespace
 
@@ -36,8 +32,8 @@ Status read_odometry(const firmware_if::OdometrySample& s, OdometryState& in_O) 
   in_O.p_m = {s.p_OB_m[0], s.p_OB_m[1], s.p_OB_m[2]};
   in_O.v_mps = {s.v_OB_mps[0], s.v_OB_mps[1], s.v_OB_mps[2]};
   const bool usable = is_finite(in_O.p_m) && is_finite(in_O.v_mps) && q.coeffs().allFinite() &&
-                      std::fabs(q.norm() - 1.0) <= kLengthTolerance && is_sigma(s.sigma_position_m) &&
-                      is_sigma(s.sigma_attitude_rad) && is_sigma(s.sigma_speed_mps);
+                      std::fabs(q.norm() - 1.0) <= kLengthTolerance && is_spread(s.sigma_position_m) &&
+                      is_spread(s.sigma_attitude_rad) && is_spread(s.sigma_speed_mps);
   if (!usable) return Status::kInvalidArgument;
   in_O.q = q.normalized();
   return Status::kOk;

@@ -51,7 +51,8 @@ bool LatticeSearch::lay_out(const PlanRequest& request, double finest_m, int cel
     reach_m *= 0.75;
     if (cells > 1 || !(reach_m > to_goal_m)) return false;
   }
-  const auto nodes = static_cast<std::size_t>(size_.z * size_.y * size_.x);
+  const auto nodes = static_cast<std::size_t>(size_.z) * static_cast<std::size_t>(size_.y) *
+                     static_cast<std::size_t>(size_.x);
   std::fill_n(state_.begin(), nodes, std::uint8_t{0});
   for (Side& side : side_) side.opened.clear();
   side_[0].from_W = side_[1].to_W = request.start_W;

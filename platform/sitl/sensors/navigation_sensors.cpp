@@ -3,17 +3,11 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
+#include "platform/sitl/sensors/draws.hpp"
 #include "platform/sitl/sensors/exposures.hpp"
 
 namespace roborun::sitl {
 namespace {
-
-// One draw a statement: the order of evaluation of arguments is not fixed.
-Vector3 normal3(core::CounterRng& rng, double sigma) noexcept {
-  Vector3 result;
-  for (int i = 0; i < 3; ++i) result[i] = sigma * rng.normal();
-  return result;
-}
 
 double wander(double value, double sigma, double correlation_s, double dt_s, core::CounterRng& rng) noexcept {
   const double decay = core::exp(-dt_s / correlation_s);

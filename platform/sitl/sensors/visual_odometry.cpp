@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
+#include "platform/sitl/sensors/draws.hpp"
 
 namespace roborun::sitl {
 namespace {
@@ -11,12 +12,6 @@ namespace {
 Quaternion turn_z(double angle_rad) noexcept {
   const core::SinCos half = core::sin_cos(0.5 * angle_rad);
   return {half.cos, 0.0, 0.0, half.sin};
-}
-
-Vector3 normal3(core::CounterRng& rng, double sigma) noexcept {
-  Vector3 result;
-  for (int i = 0; i < 3; ++i) result[i] = sigma * rng.normal();
-  return result;
 }
 
 }  // namespace
