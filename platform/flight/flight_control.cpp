@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/geometry/math.hpp"
+#include "core/geometry/yaw.hpp"
 #include "stages/planning/smoother.hpp"
 
 namespace roborun::flight {
@@ -79,7 +80,7 @@ void FlightControl::commit(MonotonicTime now) {
   if (!first_estimate_) {
     first_estimate_ = now;
     const Matrix3 R_WB = state.q_WB.toRotationMatrix();
-    yaw_rad_ = core::atan2(R_WB(1, 0), R_WB(0, 0));
+    yaw_rad_ = core::yaw_of(R_WB);
     gaze_.begin(yaw_rad_);
   }
   if (!flying_) {

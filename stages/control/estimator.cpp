@@ -3,7 +3,8 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
-#include "stages/control/yaw.hpp"
+#include "core/geometry/yaw.hpp"
+#include "core/range.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -23,7 +24,6 @@ constexpr double kLeastSigma_mps = 0.05;
 Vector3 to_vector(const std::array<double, 3>& v) noexcept { return {v[0], v[1], v[2]}; }
 
 /// A standard deviation that a measurement can be weighed with.
-bool is_sigma(double sigma) noexcept { return sigma > 0.0 && std::isfinite(sigma); }
 
 Matrix3 skew(const Vector3& v) noexcept {
   Matrix3 m;
@@ -156,9 +156,8 @@ void Estimator::start(const firmware_if::GnssFix& fix) noexcept {
   const Vector3 up_B = norm > 1.0 ? Vector3(last_force_B_ / norm) : Vector3(0.0, 0.0, 1.0);
   const Vector3 axis = up_B.cross(Vector3(0.0, 0.0, 1.0));
   const Quaternion level = Quaternion(1.0 + up_B.z(), axis.x(), axis.y(), axis.z()).normalized();
-  const double turn_rad = fix.heading_rad - yaw_of(level);
-  const core::SinCos half = core::sin_cos(0.5 * turn_rad);
-  state_.q_WB = (Quaternion(half.cos, 0.0, 0.0, half.sin) * level).normalized();
+  const double turn_rad = fix.heading_rad - core::yaw_of(level);
+  state_.q_WB = (core::turn_z(turn_rad) * level).normalized();
   shift_.begin(largest_sigma_m(fix));
   begin_filter();
 }
@@ -175,8 +174,8 @@ void Estimator::start(const firmware_if::OdometrySample& sample, const OdometryS
 Status Estimator::update(const firmware_if::GnssFix& fix) noexcept {
   const Vector3 p_W = to_vector(fix.p_WB_m);
   const Vector3 v_W = to_vector(fix.v_WB_mps);
-  if (!is_finite(p_W) || !is_finite(v_W) || !is_sigma(fix.sigma_horizontal_m) ||
-      !is_sigma(fix.sigma_vertical_m) || !is_sigma(fix.sigma_speed_mps)) {
+  if (!is_finite(p_W) || !is_finite(v_W) || !core::is_sigma(fix.sigma_horizontal_m) ||
+      !core::is_sigma(fix.sigma_vertical_m) || !core::is_sigma(fix.sigma_speed_mps)) {
     ++counters_.refused_not_finite;
     return Status::kInvalidArgument;
   }
@@ -199,7 +198,7 @@ Status Estimator::update(const firmware_if::GnssFix& fix) noexcept {
     accepted = place_frame(fix, dp_m);
   } else {
     const double gate_m = config_.gate_sigma * core::hypot2(largest_sigma_m(fix), position_sigma_m());
-    accepted = correct_by(fix, dp_m, v_W - then->v_WB, yaw_of(then->q_WB));
+    accepted = correct_by(fix, dp_m, v_W - then->v_WB, core::yaw_of(then->q_WB));
     // The vehicle did not jump with them: the inertial sensors of this second would have felt it.
     fixes_agreed_ = fixes_agreed_ || accepted;
     if (!accepted && fixes_agreed_ && dp_m.norm() > gate_m &&

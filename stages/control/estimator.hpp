@@ -84,7 +84,7 @@ class Estimator {
   static constexpr Nanos kFixPatience{2'000'000'000};
   static constexpr Nanos kAnchorPatience{200'000'000};
   static constexpr Nanos kOdometryLost{500'000'000};  ///< Since the last accepted sample.
-  static constexpr double kMapLost_m = 0.3;           ///< The finest cell.
+  static constexpr double kMapLost_m = 0.3;           ///< A published finest cell.
 
   /// Precondition, asserted: config.validate() is kOk.
   explicit Estimator(const Config& config) noexcept : config_(config), past_(config.oldest_fix) {

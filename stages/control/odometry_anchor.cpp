@@ -2,23 +2,20 @@
 
 #include <cmath>
 
-#include "core/geometry/math.hpp"
-#include "stages/control/yaw.hpp"
+#include "core/geometry/yaw.hpp"
+#include "core/range.hpp"
 
 namespace roborun::stages {
 namespace {
 
 constexpr double kLengthTolerance = 0.01;
 
-bool is_spread(double sigma) noexcept { return sigma > 0.0 && std::isfinite(sigma); }
-
 }  // namespace
 
 OdometryAnchor::OdometryAnchor(const OdometryState& in_O, const PastStates::Past& then,
                                std::uint8_t reset_counter) noexcept
     : reset_counter_(reset_counter) {
-  const core::SinCos half = core::sin_cos(0.5 * (yaw_of(then.q_WB) - yaw_of(in_O.q)));
-  q_WO_ = Quaternion(half.cos, 0.0, 0.0, half.sin);
+  q_WO_ = core::turn_z(core::yaw_of(then.q_WB) - core::yaw_of(in_O.q));
   p_WO_ = then.p_WB - q_WO_.toRotationMatrix() * in_O.p_m;
 }
 
@@ -32,8 +29,8 @@ Status read_odometry(const firmware_if::OdometrySample& s, OdometryState& in_O) 
   in_O.p_m = {s.p_OB_m[0], s.p_OB_m[1], s.p_OB_m[2]};
   in_O.v_mps = {s.v_OB_mps[0], s.v_OB_mps[1], s.v_OB_mps[2]};
   const bool usable = is_finite(in_O.p_m) && is_finite(in_O.v_mps) && q.coeffs().allFinite() &&
-                      std::fabs(q.norm() - 1.0) <= kLengthTolerance && is_spread(s.sigma_position_m) &&
-                      is_spread(s.sigma_attitude_rad) && is_spread(s.sigma_speed_mps);
+                      std::fabs(q.norm() - 1.0) <= kLengthTolerance && core::is_sigma(s.sigma_position_m) &&
+                      core::is_sigma(s.sigma_attitude_rad) && core::is_sigma(s.sigma_speed_mps);
   if (!usable) return Status::kInvalidArgument;
   in_O.q = q.normalized();
   return Status::kOk;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
+#include "core/geometry/yaw.hpp"
 #include "platform/sitl/sensors/draws.hpp"
 #include "platform/sitl/sensors/exposures.hpp"
 
@@ -121,7 +122,7 @@ void NavigationSensors::sample_product_imu(const VehicleState& state, firmware_i
 
 double NavigationSensors::compass_rad(const VehicleState& state) noexcept {
   const Matrix3 R_WB = state.q_WB.toRotationMatrix();
-  const double heading_rad = core::atan2(R_WB(1, 0), R_WB(0, 0));
+  const double heading_rad = core::yaw_of(R_WB);
   double throttle = 0.0;
   for (const double ratio : state.thrust_ratio) throttle += 0.25 * ratio;
   const double place = bounded_normal(lattice_.bits(SurfaceLattice::turn() * state.p_WB, 4.0)) *
@@ -181,7 +182,7 @@ void NavigationSensors::sample_gnss(const VehicleState& state) noexcept {
   fix.p_WB_m = to_array(state.p_WB + gnss_wander_W_m_ + noise_W_m);
   fix.v_WB_mps = to_array(state.v_WB + speed_noise_W_mps);
   const Matrix3 R_WB = state.q_WB.toRotationMatrix();
-  fix.heading_rad = core::wrap_angle(core::atan2(R_WB(1, 0), R_WB(0, 0)) + heading_noise_rad);
+  fix.heading_rad = core::wrap_angle(core::yaw_of(R_WB) + heading_noise_rad);
   fix.sigma_horizontal_m = config_.gnss_horizontal_m;
   fix.sigma_vertical_m = config_.gnss_vertical_m;
   fix.sigma_speed_mps = config_.gnss_speed_mps;

@@ -4,18 +4,10 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
+#include "core/geometry/yaw.hpp"
 #include "platform/sitl/sensors/draws.hpp"
 
 namespace roborun::sitl {
-namespace {
-
-Quaternion turn_z(double angle_rad) noexcept {
-  const core::SinCos half = core::sin_cos(0.5 * angle_rad);
-  return {half.cos, 0.0, 0.0, half.sin};
-}
-
-}  // namespace
-
 VisualOdometry::VisualOdometry(OdometryModel model, std::uint64_t seed) noexcept
     : model_(model), rng_(seed, 30) {
   scale_ = rng_.uniform() < 0.5 ? -errors_.scale_ratio : errors_.scale_ratio;
@@ -32,14 +24,14 @@ void VisualOdometry::follow(const VehicleState& state) noexcept {
   yaw_error_rad_ = decay * yaw_error_rad_ + std::sqrt(1.0 - decay * decay) * errors_.yaw_rad * rng_.normal();
   const Vector3 way_W = state.p_WB - last_W_;
   last_W_ = state.p_WB;
-  p_O_ += turn_z(frame_yaw_rad_ + yaw_error_rad_).toRotationMatrix() * ((1.0 + scale_) * way_W);
+  p_O_ += core::turn_z(frame_yaw_rad_ + yaw_error_rad_).toRotationMatrix() * ((1.0 + scale_) * way_W);
   p_O_.z() += climb_ * way_W.norm();
 }
 
 void VisualOdometry::begin_anew(const VehicleState& state) noexcept {
   ++resets_;
   const Matrix3 R_WB = state.q_WB.toRotationMatrix();
-  frame_yaw_rad_ = -core::atan2(R_WB(1, 0), R_WB(0, 0));
+  frame_yaw_rad_ = -core::yaw_of(R_WB);
   yaw_error_rad_ = 0.0;
   p_O_ = Vector3::Zero();
   reset_at_ = now_ + next_reset();
@@ -55,7 +47,7 @@ void VisualOdometry::sample(MonotonicTime now, const VehicleState& state) noexce
   follow(state);
   if (now >= reset_at_) return begin_anew(state);
   const OdometryErrors& e = errors_;
-  const Quaternion q_OW = turn_z(frame_yaw_rad_ + yaw_error_rad_);
+  const Quaternion q_OW = core::turn_z(frame_yaw_rad_ + yaw_error_rad_);
   const Vector3 tilt = normal3(rng_, 0.5 * e.attitude_rad);
   const Quaternion q_OB =
       (Quaternion(1.0, tilt.x(), tilt.y(), tilt.z()).normalized() * q_OW * state.q_WB).normalized();
