@@ -37,11 +37,25 @@ Vector3 assumed_free_half_m(const VehicleModel& vehicle, bool sees_all_around, d
   return {std::max(reach_m, half_m), std::max(reach_m, half_m), half_m};
 }
 
+class DecisionPipeline::Permitted {
+ public:
+  explicit Permitted(const DecisionPipeline& p) noexcept
+      : map_(p.map_.view()), fenced_(map_, p.config_.fence), is_fenced_(!p.config_.fence.empty()) {}
+  [[nodiscard]] const stages::MapView& view() const noexcept {
+    return is_fenced_ ? static_cast<const stages::MapView&>(fenced_) : map_;
+  }
+
+ private:
+  const stages::MapView& map_;
+  stages::FencedView fenced_;
+  bool is_fenced_;
+};
+
 class DecisionPipeline::Known {
  public:
   Known(const DecisionPipeline& p, const DecisionInput& in) noexcept
-      : fenced_(p.map_.view(), p.config_.fence),
-        finest_(p.config_.fence.empty() ? p.map_.view() : fenced_),
+      : permitted_(p),
+        finest_(permitted_.view()),
         standing_(finest_, Aabb::around(in.committed->at(in.now).p_W, p.config_.vehicle.radius_m)),
         leaves_(in.committed->start_time == p.leaves_at_) {}
   [[nodiscard]] const stages::MapView& view() const noexcept {
@@ -49,7 +63,7 @@ class DecisionPipeline::Known {
   }
 
  private:
-  stages::FencedView fenced_;
+  Permitted permitted_;
   stages::FinestView finest_;
   stages::StandingView standing_;
   bool leaves_;
@@ -199,8 +213,7 @@ void DecisionPipeline::export_map(const DecisionInput& in, DecisionOutput& out) 
 }
 
 void DecisionPipeline::search(const DecisionInput& in, double radius_m, DecisionOutput& out) noexcept {
-  const stages::FencedView fenced(map_.view(), config_.fence);
-  const stages::MapView& view = config_.fence.empty() ? map_.view() : fenced;
+  const Permitted permitted(*this);
   stages::PlanRequest request;
   request.start_W = draft_.start.p_W;
   request.goal_W = in.goal_W;
@@ -213,7 +226,7 @@ void DecisionPipeline::search(const DecisionInput& in, double radius_m, Decision
   request.seed = in.seed;
   meter_.charge_to(core::StageId::kPlanner);
   stages::PlanResult planned;
-  out.planner_status = planner_.plan(request, view, *draft_.planner_budget, planned);
+  out.planner_status = planner_.plan(request, permitted.view(), *draft_.planner_budget, planned);
   draft_.planner_work.units += planned.work.units;
   draft_.planner_work.volume_m3 += planned.work.volume_m3;
   kept_W_ = planned.path_W;
@@ -222,8 +235,7 @@ void DecisionPipeline::search(const DecisionInput& in, double radius_m, Decision
 void DecisionPipeline::fit(core::StageBudget& budget, double radius_m, double speed_mps,
                            DecisionOutput& out) noexcept {
   if (kept_W_.size() < 2) return;
-  const stages::FencedView fenced(map_.view(), config_.fence);
-  const stages::MapView& view = config_.fence.empty() ? map_.view() : fenced;
+  const Permitted permitted(*this);
   stages::SmoothRequest request;
   request.path_W = {kept_W_.begin(), kept_W_.size()};
   request.start = draft_.start;
@@ -232,7 +244,7 @@ void DecisionPipeline::fit(core::StageBudget& budget, double radius_m, double sp
   request.radius_m = radius_m;
   meter_.charge_to(core::StageId::kSmoother);
   stages::SmoothResult smoothed;
-  out.smoother_status = smoother_.smooth(request, view, budget, smoothed);
+  out.smoother_status = smoother_.smooth(request, permitted.view(), budget, smoothed);
   draft_.smoother_work.units += smoothed.work.units;
   if (out.smoother_status == Status::kOk) draft_.trajectory = smoothed.trajectory;
 }
@@ -240,8 +252,7 @@ void DecisionPipeline::fit(core::StageBudget& budget, double radius_m, double sp
 void DecisionPipeline::leave(core::StageBudget& budget, DecisionOutput& out) noexcept {
   // What is flown ends in a stop: from there.
   if (draft_.start.v_W.norm() > kAtRest_mps || draft_.start.a_W.norm() > kAtRest_mps) return;
-  const stages::FencedView fenced(map_.view(), config_.fence);
-  const stages::MapView& view = config_.fence.empty() ? map_.view() : fenced;
+  const Permitted permitted(*this);
   stages::WayOutRequest request;
   request.start_W = draft_.start.p_W;
   request.start_time = draft_.takes_over;
@@ -250,8 +261,8 @@ void DecisionPipeline::leave(core::StageBudget& budget, DecisionOutput& out) noe
   request.body_m = config_.vehicle.radius_m;
   request.room_m = radius_m();
   meter_.charge_to(core::StageId::kSmoother);
-  draft_.leaves = stages::find_way_out(request, view, stages::FinestView(view), budget, draft_.smoother_work,
-                                       draft_.trajectory);
+  draft_.leaves = stages::find_way_out(request, permitted.view(), stages::FinestView(permitted.view()),
+                                       budget, draft_.smoother_work, draft_.trajectory);
   out.smoother_status = draft_.leaves ? Status::kOk : Status::kNoPath;
 }
 

@@ -112,7 +112,9 @@ class DecisionPipeline {
     const VehicleModel& v = config_.vehicle;
     return {speed_mps, v.acceleration_mps2, v.jerk_mps3, v.climb_mps, v.descent_mps};
   }
-  /// The map at its finest, with the fence around it: what is flown is checked in it. While the vehicle leaves a place
+  /// The map, with the fence around it: what is planned in.
+  class Permitted;
+  /// The same at its finest: what is flown is checked in it. While the vehicle leaves a place
   /// without room, the box where it is does not hold it.
   class Known;
   /// What the planner's slot leaves to the smoother's.
