@@ -10,6 +10,7 @@
 #include "platform/mission/mission.hpp"
 #include "platform/mission/replay.hpp"
 #include "platform/sitl/world/world_file.hpp"
+#include "tests/platform/mission/refusal.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace roborun::mission {
@@ -35,14 +36,7 @@ class GoalFlight : public ::testing::Test {
     std::printf("\n");
     return r;
   }
-  std::string refusal() {
-    try {
-      (void)fly_mission(world_, config_, {});
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return {};
-  }
+  [[nodiscard]] std::string refusal() const { return refusal_of(world_, config_); }
   sitl::World world_;
   MissionConfig config_;
   Vector3 start_W_, goal_W_;

@@ -11,6 +11,7 @@
 #include "platform/sitl/world/world_file.hpp"
 #include "stages/perception/octomap_backend/octomap_backend.hpp"
 #include "stages/planning/ompl_backend/ompl_backend.hpp"
+#include "tests/platform/mission/refusal.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace roborun::mission {
@@ -42,15 +43,7 @@ class OwnPartsTest : public ::testing::Test {
     config_.flight.costs = board::paper().costs;
     config_.flight.model = board::paper().model;
   }
-  /// The one line with which the flight is refused; empty if it is not.
-  [[nodiscard]] std::string refusal() const {
-    try {
-      (void)fly_mission(world_, config_, {});
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return {};
-  }
+  [[nodiscard]] std::string refusal() const { return refusal_of(world_, config_); }
   sitl::World world_;
   MissionConfig config_;
 };
