@@ -14,6 +14,7 @@
 #include "platform/app/options.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
+#include "stages/planning/ways.hpp"
 
 namespace roborun::app {
 namespace {
@@ -87,6 +88,18 @@ std::string metres(const Row& r, const char* key) {
   return std::isfinite(x) ? fmt::format("{:.1f} m", x) : "none in view";
 }
 
+std::string words_of_ways(const Row& r) {
+  const std::string& ways = r.text("ways");
+  if (ways == "ok")
+    return fmt::format("{:.1f} m to the goal (a metre that nobody has seen yet counts as {:g})",
+                       r.number("way_m"), stages::kUnknownWeight);
+  if (ways == "no path") return "all that can be reached was seen, and none of it leads to the goal";
+  if (ways == "goal blocked") return "the vehicle fits nowhere near the goal";
+  if (ways == "start blocked") return "no way is known from here, which proves nothing";
+  if (ways == "budget spent") return "no time was left to look";
+  return "nothing remembers ways: it plans to its horizon";
+}
+
 }  // namespace
 
 std::string explain_decision(const std::string& name, const std::string& csv, double at_s,
@@ -150,6 +163,7 @@ std::string explain_decision(const std::string& name, const std::string& csv, do
       "m3.\n",
       r.text("p0_m"), r.text("p1_m"), metres(r, "demand_m"), r.number("v0_m3"), r.number("v1_m3"),
       r.number("v2_m3"));
+  text += "Which way     " + words_of_ways(r) + "\n";
   text +=
       fmt::format("How fast      the next trajectory may fly {:.1f} m/s.\n\n", r.number("speed_limit_mps"));
   text += fmt::format("{:<14} {:>12} {:>9}\n", "stage", "predicted s", "spent s");

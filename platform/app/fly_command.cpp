@@ -43,6 +43,7 @@ struct FlyOptions {
   std::string seed{"1"};
   std::string map{"own"};
   std::string planner{"own"};
+  std::string ways{"own"};
   std::string world;
   WorldArguments in_file;
   std::string vehicle{"paper"};
@@ -112,7 +113,7 @@ int fly(const FlyOptions& options) {
   for (const std::string& path : {options.vehicle, options.world, options.settings, options.profile})
     inputs.push_back(path);
   if (options.profile == "host") inputs.push_back(host_file_of(options));
-  for (const std::string& name : {options.map, options.planner})
+  for (const std::string& name : {options.map, options.planner, options.ways})
     inputs.push_back(name.substr(name.find(':') + 1));  // of a plugin
   input::check_outputs({{"--record", options.record}, {"--trace", options.trace}, {"--plot", options.plot}},
                        inputs);
@@ -162,6 +163,7 @@ int fly(const FlyOptions& options) {
   config.record = options.record;
   config.backends.map = options.map;
   config.backends.planner = options.planner;
+  config.backends.ways = options.ways;
   std::vector<report::MissionReport> reports;
   bool all_reached = true;
   bool all_believed = true;
@@ -260,6 +262,10 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
       ->add_option("--planner", options->planner,
                    "own, ompl:NAME with any of OMPL's geometric planners, such as ompl:RRTstar, or "
                    "plugin:FILE.so (see platform/board/plugin.hpp)")
+      ->capture_default_str();
+  fly_app
+      ->add_option("--ways", options->ways,
+                   "Memory of the ways to the goal, of design aware: own, or plugin:FILE.so")
       ->capture_default_str();
   fly_app
       ->add_option(

@@ -34,7 +34,8 @@ stages::BrickMap::Config brick_config(const Aabb& map_bounds_W, const ImageLimit
 
 std::unique_ptr<stages::OccupancyMap> make_map(const std::string& name, const PartRequest& request,
                                                core::Arena& arena) {
-  const auto& [bounds_W, images] = request;
+  const Aabb& bounds_W = request.map_bounds_W;
+  const ImageLimits& images = request.images;
   if (name == "own") return std::make_unique<stages::BrickMap>(brick_config(bounds_W, images), arena);
   if (name == "octomap")
     return stages::make_octomap_backend(
@@ -59,10 +60,16 @@ std::unique_ptr<stages::Planner> make_planner(const std::string& name, const Par
   return planner;
 }
 
+std::unique_ptr<stages::Ways> make_ways(const std::string& name, const PartRequest& request) {
+  if (name == "own") return nullptr;
+  if (is_plugin(name)) return load_ways(name, request);
+  throw InputError(fmt::format("unknown memory of ways '{}': must be own or plugin:FILE.so", name));
+}
+
 }  // namespace
 
 bool uses_plugin(const BackendNames& names) noexcept {
-  return is_plugin(names.map) || is_plugin(names.planner);
+  return is_plugin(names.map) || is_plugin(names.planner) || is_plugin(names.ways);
 }
 
 ImageLimits image_limits(const SensorRig& rig, const VehicleModel& vehicle,
@@ -92,12 +99,13 @@ std::size_t backend_bytes(const Aabb& map_bounds_W, const ImageLimits& images) {
          stages::RrtStar::arena_bytes({}) + 4096;
 }
 
-MapAndPlanner make_backends(const BackendNames& names, const Aabb& map_bounds_W, const ImageLimits& images,
-                            core::Arena& arena, const OwnParts& own) {
-  const PartRequest request{map_bounds_W, images};
-  MapAndPlanner result{own.map ? own.map(request) : make_map(names.map, request, arena),
-                       own.planner ? own.planner(request) : make_planner(names.planner, request, arena)};
-  if (result.map == nullptr || result.planner == nullptr) throw InputError("map, planner: not enough memory");
+Backends make_backends(const BackendNames& names, const PartRequest& request, core::Arena& arena,
+                       const OwnParts& own) {
+  Backends result{own.map ? own.map(request) : make_map(names.map, request, arena),
+                  own.planner ? own.planner(request) : make_planner(names.planner, request, arena),
+                  own.ways ? own.ways(request) : make_ways(names.ways, request)};
+  if (result.map == nullptr || result.planner == nullptr || (own.ways && result.ways == nullptr))
+    throw InputError("map, planner, ways: not enough memory");
   return result;
 }
 

@@ -1,4 +1,4 @@
-/// Maps and planners by name, or of the reader's own: any design flies with any of them.
+/// Maps, planners and memories of ways by name, or of the reader's own: any design flies with any of them.
 #pragma once
 
 #include <functional>
@@ -14,13 +14,15 @@
 #include "platform/flight/flight_config.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/planning/planner.hpp"
+#include "stages/planning/ways.hpp"
 
 namespace roborun::board {
 
-/// Which map and planner: "own" or "octomap", "own" or "ompl:NAME", or "plugin:FILE.so" (plugin.hpp).
+/// Which map, planner and memory of ways: "own" or "octomap", "own" or "ompl:NAME", "own", or "plugin:FILE.so" (plugin.hpp).
 struct BackendNames {
   std::string map{"own"};
   std::string planner{"own"};
+  std::string ways{"own"};
   friend bool operator==(const BackendNames&, const BackendNames&) = default;
 };
 
@@ -29,7 +31,8 @@ struct OwnParts {
   std::function<std::unique_ptr<stages::OccupancyMap>(const PartRequest&)> map{};
   std::function<std::unique_ptr<stages::Planner>(const PartRequest&)> planner{};
   std::function<std::unique_ptr<governor::DecisionPolicy>(const flight::FlightConfig&)> policy{};
-  [[nodiscard]] bool empty() const noexcept { return !map && !planner && !policy; }
+  std::function<std::unique_ptr<stages::Ways>(const PartRequest&)> ways{};
+  [[nodiscard]] bool empty() const noexcept { return !map && !planner && !policy && !ways; }
 };
 /// Of what this rig delivers.
 [[nodiscard]] ImageLimits image_limits(const SensorRig& rig, const VehicleModel& vehicle,
@@ -37,17 +40,17 @@ struct OwnParts {
 
 [[nodiscard]] bool uses_plugin(const BackendNames& names) noexcept;
 
-struct MapAndPlanner {
+struct Backends {
   std::unique_ptr<stages::OccupancyMap> map;
   std::unique_ptr<stages::Planner> planner;
+  std::unique_ptr<stages::Ways> ways;  ///< Null: those that FlightSystem has.
 };
 
 /// Bytes that the own backends take from the arena.
 [[nodiscard]] std::size_t backend_bytes(const Aabb& map_bounds_W, const ImageLimits& images);
-/// Map and planner: those of `own` where it has some, the others by name. Throws InputError for unknown names,
+/// Those of `own` where it has some, the others by name. Throws InputError for unknown names,
 /// for a plugin that is none or another program's, and for a world that the map cannot hold.
-[[nodiscard]] MapAndPlanner make_backends(const BackendNames& names, const Aabb& map_bounds_W,
-                                          const ImageLimits& images, core::Arena& arena,
-                                          const OwnParts& own = {});
+[[nodiscard]] Backends make_backends(const BackendNames& names, const PartRequest& request,
+                                     core::Arena& arena, const OwnParts& own = {});
 
 }  // namespace roborun::board

@@ -105,7 +105,7 @@ class Sweeper {
     const auto at = static_cast<std::size_t>(pose) + scene;  // a scene has a pose more than it has steps
     core::Arena arena(block_);
     stages::PointCloud cloud({}, arena);
-    const MapAndPlanner backends = make_backends(backends_, bounds_W_[scene], kImages, arena);
+    const Backends backends = make_backends(backends_, {bounds_W_[scene], kImages}, arena);
     core::UnlimitedBudget unlimited;
     core::Work work;
     const std::array<Vector3, 1> before{poses_W_[at]};

@@ -1,9 +1,10 @@
-/// What a map or a planner is made for, whoever makes it: the backends by name, a plugin, the reader's program.
+/// What a map, a planner or a memory of ways is made for, whoever makes it: the backends by name, a plugin, the reader's program.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
+#include "core/geometry/fence.hpp"
 #include "core/geometry/vector.hpp"
 #include "core/precision.hpp"
 #include "core/vehicle_model.hpp"
@@ -25,6 +26,9 @@ struct ImageLimits {
 struct PartRequest {
   Aabb map_bounds_W{};  ///< What the map must hold: the flight's bounds and a margin.
   ImageLimits images{};
+  Aabb flight_bounds_W{};                  ///< The vehicle's centre stays inside.
+  double room_m{VehicleModel{}.radius_m};  ///< Radius that is free wherever it flies, as slowly as it can.
+  core::Fence fence{};                     ///< What it forbids is no way.
 };
 
 }  // namespace roborun::board

@@ -1,4 +1,5 @@
-/// Makes a plugin of a planner or a map: `roborun fly --planner plugin:FILE.so`, `--map plugin:FILE.so`.
+/// Makes a plugin of a planner, a map or a memory of ways: `roborun fly --planner plugin:FILE.so`, `--map plugin:FILE.so`,
+/// `--ways plugin:FILE.so`.
 ///
 /// One source of a shared object includes this header and names its class once:
 ///
@@ -13,8 +14,8 @@
 ///
 /// It counts its work (stages::PlanResult::work, stages::OccupancyMap): in lockstep a flight is charged for that,
 /// and what it says is compared with the time it took (platform/mission/work_check.hpp).
-/// The class has a constructor from `const board::PartRequest&`, or none. A shared object may hold one planner
-/// and one map. Not for programs: it defines an entry.
+/// The class has a constructor from `const board::PartRequest&`, or none. A shared object may hold one planner,
+/// one map and one memory of ways. Not for programs: it defines an entry.
 #pragma once
 
 #include <type_traits>
@@ -32,6 +33,11 @@
   ROBORUN_PLUGIN_ENTRY roborun::stages::OccupancyMap* roborun_make_map(                \
       const roborun::board::PartRequest* request, roborun::AssertionHandler handler) { \
     return roborun::board::make_plugin_part<Class>(*request, handler);                 \
+  }
+#define ROBORUN_PLUGIN_WAYS(Class)                                                                          \
+  ROBORUN_PLUGIN_ENTRY roborun::stages::Ways* roborun_make_ways(const roborun::board::PartRequest* request, \
+                                                                roborun::AssertionHandler handler) {        \
+    return roborun::board::make_plugin_part<Class>(*request, handler);                                      \
   }
 
 ROBORUN_PLUGIN_ENTRY inline __attribute__((used)) const roborun::board::PluginAbi* roborun_plugin_abi() {

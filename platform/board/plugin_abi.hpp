@@ -9,6 +9,7 @@
 #include "platform/board/part_request.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/planning/planner.hpp"
+#include "stages/planning/ways.hpp"
 
 #define ROBORUN_TEXT_OF(x) #x
 #define ROBORUN_TEXT(x) ROBORUN_TEXT_OF(x)
@@ -16,8 +17,8 @@
 namespace roborun::board {
 
 /// Grows with every change of a class or struct that program and plugin both see: this file, part_request.hpp,
-/// Planner, OccupancyMap, MapView, StageBudget, DepthFrame, and what these are made of.
-inline constexpr std::uint32_t kPluginAbi = 5;
+/// Planner, OccupancyMap, Ways, MapView, StageBudget, DepthFrame, and what these are made of.
+inline constexpr std::uint32_t kPluginAbi = 6;
 
 /// A change that somebody forgot to count above, or another compiler or Eigen, shows in the sizes.
 [[nodiscard]] constexpr std::uint32_t plugin_layout() noexcept {
@@ -60,8 +61,10 @@ inline constexpr PluginAbi kProgramAbi{kPluginAbi, plugin_layout(), kPluginBuild
 using PluginAbiEntry = const PluginAbi* (*)();
 using PluginPlannerEntry = stages::Planner* (*)(const PartRequest*, AssertionHandler);
 using PluginMapEntry = stages::OccupancyMap* (*)(const PartRequest*, AssertionHandler);
+using PluginWaysEntry = stages::Ways* (*)(const PartRequest*, AssertionHandler);
 inline constexpr const char* kPluginAbiEntry = "roborun_plugin_abi";
 inline constexpr const char* kPluginPlannerEntry = "roborun_make_planner";
 inline constexpr const char* kPluginMapEntry = "roborun_make_map";
+inline constexpr const char* kPluginWaysEntry = "roborun_make_ways";
 
 }  // namespace roborun::board

@@ -73,4 +73,8 @@ std::unique_ptr<stages::Planner> load_planner(const std::string& name, const Par
   return load<stages::Planner, PluginPlannerEntry>(name, kPluginPlannerEntry, "planner", request);
 }
 
+std::unique_ptr<stages::Ways> load_ways(const std::string& name, const PartRequest& request) {
+  return load<stages::Ways, PluginWaysEntry>(name, kPluginWaysEntry, "memory of ways", request);
+}
+
 }  // namespace roborun::board

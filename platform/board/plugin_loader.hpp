@@ -1,4 +1,4 @@
-/// Takes a map or a planner out of a shared object (plugin.hpp).
+/// Takes a map, a planner or a memory of ways out of a shared object (plugin.hpp).
 #pragma once
 
 #include <memory>
@@ -7,6 +7,7 @@
 #include "platform/board/part_request.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/planning/planner.hpp"
+#include "stages/planning/ways.hpp"
 
 namespace roborun::board {
 
@@ -20,5 +21,6 @@ namespace roborun::board {
                                                              const PartRequest& request);
 [[nodiscard]] std::unique_ptr<stages::Planner> load_planner(const std::string& name,
                                                             const PartRequest& request);
+[[nodiscard]] std::unique_ptr<stages::Ways> load_ways(const std::string& name, const PartRequest& request);
 
 }  // namespace roborun::board

@@ -72,7 +72,7 @@ class DecisionPipeline::Known {
 DecisionPipeline::DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter,
                                    governor::DecisionPolicy& policy, stages::PointCloud& cloud,
                                    stages::OccupancyMap& map, stages::Planner& planner,
-                                   stages::Smoother& smoother, stages::WayMemory* ways) noexcept
+                                   stages::Smoother& smoother, stages::Ways* ways) noexcept
     : config_(config),
       meter_(meter),
       policy_(policy),
@@ -295,8 +295,8 @@ void DecisionPipeline::remember(const DecisionInput& in, DecisionOutput& out) no
   Status status = ways_->look(map_.view(), in.p_WB, config_.horizon_m + 1.0, *draft_.planner_budget, work);
   if (status == Status::kOk) status = ways_->solve(draft_.start.p_W, in.goal_W, *draft_.planner_budget, work);
   ways_known_ = status == Status::kOk;
-  out.no_way = status == Status::kNoPath;
-  out.goal_blocked = status == Status::kGoalBlocked;
+  out.ways_status = status;
+  if (ways_known_) out.way_m = ways_->to_goal_m(draft_.start.p_W);
   draft_.planner_work.units += work.units;
 }
 

@@ -24,7 +24,7 @@
 #include "stages/perception/space_profiler.hpp"
 #include "stages/planning/planner.hpp"
 #include "stages/planning/smoother.hpp"
-#include "stages/planning/way_memory.hpp"
+#include "stages/planning/ways.hpp"
 
 namespace roborun::flight {
 
@@ -77,10 +77,12 @@ struct DecisionOutput {
   governor::Decision decision{};
   core::StageArray<core::Work> work{};
   core::StageArray<Nanos> cost{};
-  bool no_way{};  ///< All that can be reached was seen, and none of it leads to the goal (WayMemory::solve).
-  bool goal_blocked{};  ///< No place of the vehicle is near the goal (WayMemory::solve).
-  bool motion{};        ///< Something was seen to move nearby, not long ago.
-  Nanos latency{};      ///< Sum of the costs: when the result is there, counted from input.now.
+  Status ways_status{
+      Status::kNotReady};  ///< Of Ways::look() or solve(); kNotReady: nothing remembers ways here.
+  double
+      way_m{};  ///< Length of the way to the goal if ways_status is kOk: what is unknown on it counts kUnknownWeight times.
+  bool motion{};    ///< Something was seen to move nearby, not long ago.
+  Nanos latency{};  ///< Sum of the costs: when the result is there, counted from input.now.
 };
 
 /// Runs the stages in the order of the frame table, each under the budget that the governor granted it.
@@ -90,7 +92,7 @@ class DecisionPipeline {
   /// Policy, map and planner are given from outside, so that any backend flies with any design.
   DecisionPipeline(const PipelineConfig& config, core::StageMeter& meter, governor::DecisionPolicy& policy,
                    stages::PointCloud& cloud, stages::OccupancyMap& map, stages::Planner& planner,
-                   stages::Smoother& smoother, stages::WayMemory* ways = nullptr) noexcept;
+                   stages::Smoother& smoother, stages::Ways* ways = nullptr) noexcept;
 
   /// One stage of a decision; all of them in order make one. `out` is begun by the first (kPointCloud) and
   /// complete after the last (kSmoother). Where the path leaves the smoother no room, kSmoother plans once
@@ -176,9 +178,9 @@ class DecisionPipeline {
   stages::OccupancyMap& map_;
   stages::Planner& planner_;
   stages::Smoother& smoother_;
-  stages::WayMemory* ways_;  ///< Null: the planner knows its horizon alone.
-  bool ways_known_{false};   ///< In this decision.
-  stages::Path kept_W_;      ///< What was planned last.
+  stages::Ways* ways_;      ///< Null: the planner knows its horizon alone.
+  bool ways_known_{false};  ///< In this decision.
+  stages::Path kept_W_;     ///< What was planned last.
   MotionWatch motion_;
   bool has_planned_{false};  ///< A plan was found since the take-off.
   MonotonicTime leaves_at_ =

@@ -62,10 +62,12 @@ void DecisionProgram::judge() noexcept {
   report_.failures = fine ? 0 : report_.failures + 1;
   const bool hovers =
       mail_.report.read().action == Action::kGoOn && !in_.climbing && in_.v_WB.norm() < kHover_mps;
-  no_way_ = hovers && out_.no_way ? no_way_ + 1 : 0;
+  no_way_ = hovers && out_.ways_status == Status::kNoPath ? no_way_ + 1 : 0;
   const bool stays = hovers && out_.kind != DecisionKind::kNew;
   goal_blocked_ =
-      stays && (out_.goal_blocked || out_.planner_status == Status::kGoalBlocked) ? goal_blocked_ + 1 : 0;
+      stays && (out_.ways_status == Status::kGoalBlocked || out_.planner_status == Status::kGoalBlocked)
+          ? goal_blocked_ + 1
+          : 0;
   const std::uint64_t refusals = pipeline_.map().refusals();
   report_.map_refusals = refusals > refusals_before_ ? report_.map_refusals + 1 : 0;
   refusals_before_ = refusals;

@@ -40,9 +40,8 @@ stages::WayMemory::Config way_config(const FlightConfig& config) noexcept {
   return ways;
 }
 
-/// The published designs know their horizon alone.
 bool remembers_ways(const FlightConfig& config) noexcept {
-  return config.design == governor::Design::kAware && stages::WayMemory::fits(way_config(config));
+  return knows_ways(config.design) && stages::WayMemory::fits(way_config(config));
 }
 
 std::optional<stages::WayMemory> ways_of(const FlightConfig& config, core::Arena& arena) noexcept {
@@ -135,7 +134,9 @@ FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, 
       governor_(governor_config(config)),
       policy_(parts.policy != nullptr ? *parts.policy : governor_),
       pipeline_(pipeline_config(config), meter, policy_, cloud_, parts.map, parts.planner, smoother_,
-                ways_ ? &*ways_ : nullptr),
+                parts.ways != nullptr ? parts.ways
+                : ways_               ? &*ways_
+                                      : nullptr),
       control_(config.vehicle, seconds(config.minor_frame), gaze_of(config)),
       flight_program_({config.vehicle, config.fence, config.answers}, control_, aircraft, mail_),
       decision_program_(

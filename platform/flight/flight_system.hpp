@@ -14,6 +14,7 @@
 #include "platform/flight/flight_config.hpp"
 #include "platform/flight/flight_control.hpp"
 #include "platform/flight/flight_program.hpp"
+#include "stages/planning/way_memory.hpp"
 
 namespace roborun::flight {
 
@@ -22,7 +23,13 @@ struct FlightParts {
   stages::OccupancyMap& map;  ///< Of map_bounds_W(), at least.
   stages::Planner& planner;
   governor::DecisionPolicy* policy{nullptr};  ///< Null: the governor that ships.
+  stages::Ways* ways{nullptr};                ///< Null: the memory that ships, where knows_ways().
 };
+
+/// The published designs know their horizon alone.
+[[nodiscard]] constexpr bool knows_ways(governor::Design design) noexcept {
+  return design == governor::Design::kAware;
+}
 
 /// What the governor that ships is made from for this flight: where a policy that builds on it begins.
 [[nodiscard]] governor::GovernorConfig governor_config(const FlightConfig& config) noexcept;
@@ -52,8 +59,9 @@ class FlightSystem {
   stages::OccupancyMap& map_;
   stages::PointCloud cloud_;
   stages::Smoother smoother_;
-  std::optional<stages::WayMemory> ways_;  ///< Of the aware design, where the world fits.
-  governor::Governor governor_;            ///< Idle if the policy is the reader's own.
+  std::optional<stages::WayMemory>
+      ways_;  ///< Where knows_ways() and the world fits; idle if the ways are the reader's own.
+  governor::Governor governor_;  ///< Idle if the policy is the reader's own.
   governor::DecisionPolicy& policy_;
   DecisionPipeline pipeline_;
   FlightControl control_;

@@ -7,14 +7,25 @@
 #include "platform/input/input_error.hpp"
 
 namespace roborun::mission {
+namespace {
+
+board::PartRequest request_of(const flight::FlightConfig& config, const board::ImageLimits& images) {
+  return {map_bounds_W(config), images, config.bounds_W, slow_radius_m(config.vehicle), config.fence};
+}
+
+}  // namespace
 
 FlightSetup::FlightSetup(const flight::FlightConfig& config, const board::BackendNames& backends,
                          const board::ImageLimits& images, const board::OwnParts& own)
     : block_(flight::FlightSystem::arena_bytes(config) + board::backend_bytes(map_bounds_W(config), images) +
              4096),
       arena_(block_),
-      parts_(board::make_backends(backends, map_bounds_W(config), images, arena_, own)),
-      policy_(own.policy ? own.policy(config) : nullptr) {}
+      parts_(board::make_backends(backends, request_of(config, images), arena_, own)),
+      policy_(own.policy ? own.policy(config) : nullptr) {
+  if (parts_.ways != nullptr && !flight::knows_ways(config.design))
+    throw InputError(fmt::format("ways: design {} knows its horizon alone: must be own, or another design",
+                                 governor::to_string(config.design)));
+}
 
 void FlightSetup::check() const {
   if (arena_.exhausted()) throw InputError("memory plan: the arena is too small for this world");

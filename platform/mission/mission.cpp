@@ -192,8 +192,9 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
 }
 
 flight::FlightParts MissionRun::parts() {
-  if (faults_.empty()) return {timed_map_, timed_planner_, setup_.parts().policy};
-  return {timed_map_, planner_, setup_.parts().policy};
+  const flight::FlightParts own = setup_.parts();
+  stages::Planner& planner = faults_.empty() ? static_cast<stages::Planner&>(timed_planner_) : planner_;
+  return {timed_map_, planner, own.policy, own.ways};
 }
 
 void MissionRun::refuse_silence() const {
@@ -282,6 +283,8 @@ void MissionRun::record_decision(const flight::DecisionOutput& out) {
   r.gap_average_m = out.profile.gap_average_m;
   r.sensor_volume_m3 = out.profile.sensor_volume_m3;
   r.map_volume_m3 = out.profile.map_volume_m3;
+  r.ways_status = to_string(out.ways_status);
+  r.way_m = out.way_m;
   r.planner_status = to_string(out.planner_status);
   r.smoother_status = to_string(out.smoother_status);
   r.missed = out.latency > point.deadline;
@@ -300,6 +303,7 @@ void MissionRun::summarise(double wall_s) {
   r.seed = config_.seed;
   r.map = config_.own.map ? kCustom : config_.backends.map;
   r.planner = config_.own.planner ? kCustom : config_.backends.planner;
+  r.ways = config_.own.ways ? kCustom : config_.backends.ways;
   r.mission_time_s = seconds(flight_.now().time_since_epoch());
   r.mean_velocity_mps = r.mission_time_s > 0.0 ? r.distance_m / r.mission_time_s : 0.0;
   r.energy_kJ = 1e-3 * aircraft_.vehicle().state().energy_J;

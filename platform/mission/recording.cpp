@@ -13,8 +13,8 @@ namespace {
 const std::string& recordable(const std::string& path, const MissionConfig& config) {
   if (!config.own.empty() || uses_plugin(config.backends))
     throw InputError(
-        fmt::format("{}: a recording is flown again without code of others: must be a flight with map and "
-                    "planner by name",
+        fmt::format("{}: a recording is flown again without code of others: must be a flight with map, "
+                    "planner and ways by name",
                     path));
   for (const TimedFault& f : config.faults) {
     for (const sitl::Component component :

@@ -35,6 +35,7 @@ std::string to_json(const MissionResult& r) {
   json["state_hash"] = r.state_hash;
   json["map"] = r.map;
   json["planner"] = r.planner;
+  json["ways"] = r.ways;
   json["mission"] = r.mission;
   json["reason"] = r.reason;
   json["speed_limit_mps"] = r.speed_limit_mps;

@@ -58,6 +58,7 @@ struct MissionResult {
   std::string state_hash;  ///< 16 hexadecimal digits.
   std::string map;
   std::string planner;
+  std::string ways;
   std::string mission;
   std::string reason;             ///< Why the mission ended.
   double speed_limit_mps{};       ///< v_max of the design.
@@ -91,6 +92,8 @@ struct DecisionRecord {
   double gap_average_m{};
   double sensor_volume_m3{};
   double map_volume_m3{};
+  std::string ways_status;  ///< DecisionOutput::ways_status.
+  double way_m{};           ///< DecisionOutput::way_m.
   std::string planner_status;
   std::string smoother_status;
   bool missed{};

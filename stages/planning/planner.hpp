@@ -9,13 +9,9 @@
 #include "core/memory/static_vector.hpp"
 #include "firmware_if/status.hpp"
 #include "stages/perception/map_view.hpp"
+#include "stages/planning/ways.hpp"
 
 namespace roborun::stages {
-
-/// A metre of space that nobody has seen yet counts as this many metres of known path: it may hide a detour.
-inline constexpr double kUnknownWeight = 2.0;
-
-class WayMemory;
 
 inline constexpr std::size_t kMaxWaypoints = 64;
 using Path = core::StaticVector<Vector3, kMaxWaypoints>;
@@ -32,7 +28,7 @@ struct PlanRequest {
   /// The path of the plan before, or empty: a hint. Nothing of it is taken unchecked.
   Path kept_W{};
   /// What is known of the ways to the goal, or null: then the rest of a way counts as straight and unknown.
-  const WayMemory* ways{nullptr};
+  const Ways* ways{nullptr};
   std::uint64_t seed{};  ///< Same request, same map, same seed: same path.
 };
 

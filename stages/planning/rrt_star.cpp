@@ -7,7 +7,6 @@
 #include "core/geometry/math.hpp"
 #include "firmware_if/assert.hpp"
 #include "stages/perception/polled_view.hpp"
-#include "stages/planning/way_memory.hpp"
 
 namespace roborun::stages {
 namespace {

@@ -14,6 +14,7 @@
 #include "firmware_if/status.hpp"
 #include "stages/perception/map_view.hpp"
 #include "stages/planning/way_rooms.hpp"
+#include "stages/planning/ways.hpp"
 
 namespace roborun::stages {
 
@@ -23,7 +24,7 @@ namespace roborun::stages {
 /// at kUnknownWeight times its length, until it comes to the vehicle. Exact in what is connected (for whole cells), coarse in
 /// lengths. Source: Dijkstra (1959), over the regions of Botea, Mueller, Schaeffer, "Near optimal hierarchical
 /// path-finding" (2004).
-class WayMemory {
+class WayMemory final : public Ways {
  public:
   struct Config {
     Aabb bounds_W{};  ///< The vehicle's centre stays inside.
@@ -40,24 +41,15 @@ class WayMemory {
   /// Preconditions, asserted: fits(config), and the arena has arena_bytes().
   WayMemory(const Config& config, core::Arena& arena) noexcept;
 
-  /// Reads what the map knows now within `reach_m` of a place. kOk or kBudgetSpent: the rest stays as it was.
-  Status look(const MapView& map, const Vector3& p_W, double reach_m, core::StageBudget& budget,
-              core::Work& work) noexcept;
-  /// The ways to the goal from everywhere that is not farther from it than the vehicle. kOk; kNoPath: there is none, as
-  /// far as is known now; kStartBlocked, kGoalBlocked: no place of the vehicle is near (or from those near the start
-  /// no way leads on, which proves nothing); kBudgetSpent: no answer.
-  Status solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
-               core::Work& work) noexcept;
-
-  /// Nothing is known of any way. RT-safe: O(size of the world).
-  void forget() noexcept;
-
-  /// Metres of known way, after solve(); +inf where it did not come.
-  [[nodiscard]] double to_goal_m(const Vector3& p_W) const noexcept;
-  /// The way from a place: corners in known space one after the other, no farther than `within_m` from it, the last one
-  /// where unknown space begins or the goal itself. Returns how many were written.
+  [[nodiscard]] Status look(const MapView& map, const Vector3& p_W, double reach_m, core::StageBudget& budget,
+                            core::Work& work) noexcept override;
+  [[nodiscard]] Status solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
+                             core::Work& work) noexcept override;
+  /// RT-safe: O(size of the world).
+  void forget() noexcept override;
+  [[nodiscard]] double to_goal_m(const Vector3& p_W) const noexcept override;
   [[nodiscard]] std::size_t known_way(const Vector3& from_W, double within_m,
-                                      std::span<Vector3> way_W) const noexcept;
+                                      std::span<Vector3> way_W) const noexcept override;
 
  private:
   struct Cell {

@@ -40,6 +40,8 @@ refuses "whole number" fly --seed 1x
 refuses "own or octomap" fly --map foo
 refuses "cannot be loaded" fly --map plugin:nope.so
 refuses "cannot be loaded" fly --planner plugin:nope.so
+refuses "cannot be loaded" fly --ways plugin:nope.so
+refuses "own or plugin:FILE.so" fly --ways foo
 refuses "must be plugin:FILE.so" fly --planner plugin:
 refuses "cannot be loaded" calibrate --repeats 1 --planner plugin:nope.so
 refuses "must go with --host-file" fly --profile host --planner plugin:nope.so
@@ -176,6 +178,14 @@ if [[ $(wc -l <<<"$names") -ge 15 && -z $(uniq -d <<<"$names") && $pools != *nul
   passed=$((passed + 1))
 else
   echo "FAILED memory --fly 20 names a pool twice or has no high-water mark: $pools"
+  failed=$((failed + 1))
+fi
+# Goals are flown one after the other, each with its answer, and the mission ends at the last.
+goals=$("$roborun" fly --world "$data/worlds/two_pillars.toml" --goal 30,-6,4 --goal 60,0,4 --json)
+if [[ $? -eq 0 && $goals == *'"reached_goal":true'* && $(grep -o '"answer":"reached"' <<<"$goals" | wc -l) -eq 2 ]]; then
+  passed=$((passed + 1))
+else
+  echo "FAILED fly with two goals: ${goals:0:400}"
   failed=$((failed + 1))
 fi
 # What the program says of its keys is what the documents say.

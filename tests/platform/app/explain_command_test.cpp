@@ -26,6 +26,8 @@ std::string trace() {
     }
   }
   missions[0].decisions[7].missed = true;
+  missions[1].decisions[3].ways_status = "no path";
+  missions[1].decisions[4].ways_status = "not ready";
   const std::string path = test::scratch("explain.csv");
   input::write_file(path, report::trace_csv(missions));
   std::ifstream file(path);
@@ -40,8 +42,15 @@ TEST(Explain, NamesTheDecisionInForceAndEverythingThatSetIt) {
   EXPECT_NE(text.find("all the time is used"), std::string::npos);
   EXPECT_NE(text.find("nearest obstacle"), std::string::npos);
   EXPECT_NE(text.find("LATE"), std::string::npos);
+  EXPECT_NE(text.find("Which way     585.0 m to the goal"), std::string::npos) << text;
   EXPECT_NE(explain_decision("t.csv", trace(), 3.0, "static").find("Decision 4 of static"),
             std::string::npos);
+}
+
+TEST(Explain, SaysWhatTheWaysSaid) {
+  const auto way = [](double at_s) { return explain_decision("t.csv", trace(), at_s, "static"); };
+  EXPECT_NE(way(3.0).find("none of it leads to the goal"), std::string::npos);
+  EXPECT_NE(way(4.0).find("nothing remembers ways"), std::string::npos);
 }
 
 TEST(Explain, RefusesATimeOutsideAnUnknownDesignAndAnotherFile) {

@@ -1,4 +1,4 @@
-/// A planner and a map in one plugin; both do nothing.
+/// A planner, a map and a memory of ways in one plugin; none of them does anything.
 #include "platform/board/plugin.hpp"
 
 namespace roborun::board {
@@ -40,8 +40,30 @@ class Map final : public stages::OccupancyMap, stages::MapView {
   std::size_t side_;
 };
 
+class Ways final : public stages::Ways {
+ public:
+  explicit Ways(const PartRequest& request) : room_m_(request.room_m) {}
+  [[nodiscard]] Status look(const stages::MapView&, const Vector3&, double, core::StageBudget&,
+                            core::Work&) noexcept override {
+    return Status::kOk;
+  }
+  [[nodiscard]] Status solve(const Vector3&, const Vector3&, core::StageBudget&,
+                             core::Work&) noexcept override {
+    return Status::kOk;
+  }
+  void forget() noexcept override {}
+  [[nodiscard]] double to_goal_m(const Vector3&) const noexcept override { return room_m_; }
+  [[nodiscard]] std::size_t known_way(const Vector3&, double, std::span<Vector3>) const noexcept override {
+    return 0;
+  }
+
+ private:
+  double room_m_;
+};
+
 }  // namespace
 }  // namespace roborun::board
 
 ROBORUN_PLUGIN_PLANNER(roborun::board::Planner)
 ROBORUN_PLUGIN_MAP(roborun::board::Map)
+ROBORUN_PLUGIN_WAYS(roborun::board::Ways)

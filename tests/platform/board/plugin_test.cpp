@@ -30,7 +30,7 @@ std::string refusal(const std::string& name) {
   return "none";
 }
 
-TEST(Plugin, GivesAPlannerAndAMapThatAreDeletedByTheCaller) {
+TEST(Plugin, GivesPartsThatAreDeletedByTheCaller) {
   for (int i = 0; i < 2; ++i) {
     const auto planner = load_planner(plugin("good_plugin.so"), kRequest);
     ASSERT_NE(planner, nullptr);
@@ -40,6 +40,9 @@ TEST(Plugin, GivesAPlannerAndAMapThatAreDeletedByTheCaller) {
     ASSERT_NE(map, nullptr);
     EXPECT_EQ(planner->plan({}, map->view(), unlimited, result), Status::kNoPath);
     EXPECT_EQ(map->bytes(), 64U) << "it got the request";
+    const auto ways = load_ways(plugin("good_plugin.so"), kRequest);
+    ASSERT_NE(ways, nullptr);
+    EXPECT_EQ(ways->to_goal_m(Vector3::Zero()), kRequest.room_m) << "it got the request";
   }
 }
 
@@ -60,6 +63,7 @@ TEST(Plugin, ThatCannotMakeItsPartSaysSo) {
 
 TEST(Plugin, WithoutThePartIsRefused) {
   EXPECT_THROW((void)load_map(plugin("failing_plugin.so"), kRequest), InputError);
+  EXPECT_THROW((void)load_ways(plugin("failing_plugin.so"), kRequest), InputError);
 }
 
 TEST(Plugin, ThatIsNoneIsRefused) {
@@ -78,6 +82,7 @@ TEST(Plugin, ThatIsNoneIsRefused) {
 TEST(Plugin, IsNeitherMeasuredIntoTheCacheNorForgottenInNames) {
   EXPECT_TRUE(uses_plugin({"own", "plugin:x.so"}));
   EXPECT_TRUE(uses_plugin({"plugin:x.so", "own"}));
+  EXPECT_TRUE(uses_plugin({"own", "own", "plugin:x.so"}));
   EXPECT_FALSE(uses_plugin({"octomap", "ompl:RRTstar"}));
   EXPECT_THROW((void)default_host_path({"own", "plugin:x.so"}), InputError);
 }

@@ -11,6 +11,7 @@
 #include "platform/sitl/world/world_file.hpp"
 #include "stages/perception/octomap_backend/octomap_backend.hpp"
 #include "stages/planning/ompl_backend/ompl_backend.hpp"
+#include "stages/planning/way_memory.hpp"
 #include "tests/platform/mission/refusal.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -35,6 +36,39 @@ class PassingPolicy final : public governor::DecisionPolicy {
  private:
   governor::Governor governor_;
   int& decisions_;
+};
+
+/// Asks the memory that ships, and counts.
+class PassingWays final : public stages::Ways {
+ public:
+  PassingWays(const stages::WayMemory::Config& config, int& solved)
+      : block_(stages::WayMemory::arena_bytes(config)),
+        arena_(block_),
+        memory_(config, arena_),
+        solved_(solved) {}
+  [[nodiscard]] Status look(const stages::MapView& map, const Vector3& p_W, double reach_m,
+                            core::StageBudget& budget, core::Work& work) noexcept override {
+    return memory_.look(map, p_W, reach_m, budget, work);
+  }
+  [[nodiscard]] Status solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
+                             core::Work& work) noexcept override {
+    ++solved_;
+    return memory_.solve(from_W, goal_W, budget, work);
+  }
+  void forget() noexcept override { memory_.forget(); }
+  [[nodiscard]] double to_goal_m(const Vector3& p_W) const noexcept override {
+    return memory_.to_goal_m(p_W);
+  }
+  [[nodiscard]] std::size_t known_way(const Vector3& from_W, double within_m,
+                                      std::span<Vector3> way_W) const noexcept override {
+    return memory_.known_way(from_W, within_m, way_W);
+  }
+
+ private:
+  std::vector<std::byte> block_;
+  core::Arena arena_;
+  stages::WayMemory memory_;
+  int& solved_;
 };
 
 class OwnPartsTest : public ::testing::Test {
@@ -79,6 +113,21 @@ TEST_F(OwnPartsTest, MapAndPlannerFromFactoriesFlyAsThoseByName) {
   EXPECT_EQ(own.planner, "custom");
 }
 
+TEST_F(OwnPartsTest, WaysThatAskTheMemoryThatShipsFlyTheSameBits) {
+  const std::string hash = fly_mission(world_, config_, {}).result.state_hash;
+  int solved = 0;
+  config_.own.ways = [&solved](const board::PartRequest& r) {
+    const stages::WayMemory::Config config{r.flight_bounds_W, r.room_m, r.images.lattice.finest_m, r.fence};
+    return std::make_unique<PassingWays>(config, solved);
+  };
+  const report::MissionResult own = fly_mission(world_, config_, {}).result;
+  EXPECT_EQ(own.state_hash, hash);
+  EXPECT_GT(solved, 5);
+  EXPECT_EQ(own.ways, "custom");
+  config_.flight.design = governor::Design::kStatic;
+  EXPECT_NE(refusal().find("ways: design static knows its horizon alone"), std::string::npos) << refusal();
+}
+
 TEST_F(OwnPartsTest, AFactoryThatMakesNothingIsRefused) {
   config_.own.planner = [](const board::PartRequest&) { return nullptr; };
   EXPECT_NE(refusal().find("not enough memory"), std::string::npos) << refusal();
@@ -87,10 +136,12 @@ TEST_F(OwnPartsTest, AFactoryThatMakesNothingIsRefused) {
 TEST_F(OwnPartsTest, AreNotRecorded) {
   config_.record = test::scratch("own.rec");
   config_.backends.planner = "plugin:x.so";
-  EXPECT_NE(refusal().find("must be a flight with map and planner by name"), std::string::npos) << refusal();
+  EXPECT_NE(refusal().find("must be a flight with map, planner and ways by name"), std::string::npos)
+      << refusal();
   config_.backends = {};
   config_.own.planner = [](const board::PartRequest&) { return stages::make_ompl_planner("RRTstar", {}); };
-  EXPECT_NE(refusal().find("must be a flight with map and planner by name"), std::string::npos) << refusal();
+  EXPECT_NE(refusal().find("must be a flight with map, planner and ways by name"), std::string::npos)
+      << refusal();
 }
 
 TEST_F(OwnPartsTest, ARecordingDoesNotChooseWhatCodeIsLoaded) {

@@ -26,6 +26,8 @@ inline report::MissionReport sample_mission(const std::string& design, double sp
     d.speed_mps = speed_mps;
     d.p0_m = 0.3;
     d.budget_source = "trajectory";
+    d.ways_status = "ok";
+    d.way_m = 45.0 * (20 - i);
     d.planner_status = "ok";
     d.smoother_status = "ok";
     m.decisions.push_back(d);
