@@ -38,6 +38,7 @@ struct Marks {
   Bits whole{0};    ///< Covered by a camera that has not marked it so.
   Bits sparse{0};   ///< Too many of a camera's pixels are; a part of the block may be free.
   Bits unseen{0};   ///< The same, or all of them are.
+  Bits shaded{0};   ///< A part of it lies in the camera's view and is hidden.
 };
 
 template <class Bits>
@@ -45,10 +46,11 @@ struct Decision {
   Bits free, mixed, in_part;  ///< in_part: of the free ones.
 };
 
-/// Seen as free by one camera and as hidden by another that sees all of it: they disagree, and always will.
+/// Seen as free by one camera and as hidden by another that sees all of it: they disagree, and always will. What lies across
+/// the border of two images is seen past by both of them together only if neither hides its part.
 template <class Bits>
 HWY_INLINE Decision<Bits> decide(const Marks<Bits>& marks, bool complete) {
-  const Bits covered = marks.covered | (complete ? ~marks.unseen : Bits{0});
+  const Bits covered = marks.covered | (complete ? ~(marks.unseen | marks.shaded) : Bits{0});
   const Bits free = marks.free & ~marks.mixed & ~marks.blocked & covered;
   return {free, (marks.mixed | ((marks.free | marks.sparse) & ~covered)) & ~marks.blocked,
           free & marks.in_part & ~marks.whole};
@@ -317,6 +319,7 @@ HWY_INLINE void look_through(const Look& look, bool are_cells, Marks<unsigned>& 
   marks.free |= sees_past;
   marks.covered |= sees_past & look.inside;
   marks.blocked |= hidden & look.inside;
+  marks.shaded |= hidden & ~look.inside;
   marks.mixed |= look.straddling | mixed;
 }
 

@@ -153,6 +153,7 @@ void see_blocks_lanes(const SightCameras& cameras, int level, std::span<const Ve
       spread(here.covered, marks.covered);
       spread(here.sparse, marks.sparse);
       spread(here.unseen, marks.unseen);
+      spread(here.shaded, marks.shaded);
     }
   }
   const Decision<std::uint64_t> decision = decide(marks, cameras.complete);

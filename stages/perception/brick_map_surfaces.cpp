@@ -12,13 +12,17 @@ namespace {
 constexpr double kThinMost_m = 0.2;
 /// Surfaces differ by more than this at a step, besides the error of the depth.
 constexpr double kStep_m = 0.25;
+/// Of the error of a camera that mixes pixels, what has to fit into a cell: its surfaces are wrong more often than noise alone
+/// would make them.
+constexpr double kMixedSigmas = 1.5;
 constexpr int kTileLevel = 2;  // where a tile may end is known in cells of this size
 constexpr std::int32_t kTileCells = 1 << (kBrickLevel - kTileLevel);  // of a brick's edge
 
-/// The depth at which a pixel ends a cell's edge beside where it says (one sigma).
+/// The depth at which a pixel ends a cell's edge beside where it says: one sigma, or kMixedSigmas of a camera that mixes.
 double exact_reach_m(const DepthError& error, double finest_m) noexcept {
+  const double sigmas = error.mixes ? kMixedSigmas : 1.0;
   const double a = error.quadratic_per_m, b = error.angle_rad;
-  const double room_m = std::max(finest_m - error.constant_m - error.place_m, 0.0);
+  const double room_m = std::max(finest_m / sigmas - error.constant_m - error.place_m, 0.0);
   // a z^2 + b z = room
   const double root = b + std::sqrt(b * b + 4.0 * a * room_m);
   return root > 0.0 ? std::min(2.0 * room_m / root, static_cast<double>(kMaxRange_m))

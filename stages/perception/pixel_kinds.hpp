@@ -23,7 +23,8 @@ struct PixelRow {
   /// nothing is where it ends.
   alignas(32) std::array<float, kMaxImageSide + kPad> depth_m{};
   /// Bit i of all words: pixel i is nearer than both pixels beside it, or above and below it, by a step. (One of them may have
-  /// no information.)
+  /// no information.) Of a camera that mixes it must not be alone, nor beside one that is nearer: such pixels lie anywhere
+  /// between what is in front and what is behind.
   std::array<std::uint64_t, kMaxImageSide / 64 + 1> thin{};
   bool any_thin{};
 };

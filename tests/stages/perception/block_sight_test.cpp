@@ -223,6 +223,41 @@ TEST_F(BlockSight, ABrickIsSeenAsItsBlocksOneByOne) {
   EXPECT_LT(different, free_cells / 10000) << "positions are rounded on the way down in one of them only";
 }
 
+/// A wall ends where the image to the left ends: what lies across the border behind it is seen past by the image ahead, and is
+/// hidden in the other one.
+TEST_F(BlockSight, WhatOneOfTwoImagesHidesIsNotFreeByBothTogether) {
+  const Vector3 at_W(0.0, 0.0, 5.0);
+  for (const bool wall : {false, true}) {
+    scene_.solid.clear();
+    if (wall) scene_.solid.push_back({Vector3(-20, 3, -20), Vector3(3, 4, 30)});
+    frames_ = scene_.look(at_W, 45);
+    std::vector<std::byte> block(6 * DepthPyramid::arena_bytes(45, 45));
+    core::Arena arena(block);
+    std::array<std::optional<DepthPyramid>, 6> image;
+    SightCameras cameras;
+    for (std::size_t i = 0; i < 6; ++i) {
+      image[i].emplace(arena, 45, 45);
+      ASSERT_EQ(image[i]->build(frames_[i].frame), Status::kOk);
+      cameras.camera[i].prepare(frames_[i], *image[i]);
+    }
+    cameras.count = 6;
+    cameras.complete = true;
+    core::CounterRng rng(9);
+    for (int level = 0; level <= kBrickLevel; ++level) {
+      const double half_m = 0.5 * PrecisionLattice{}.cell_size_m(level) * (level == 0 ? 0.5 : 1.0);
+      std::vector<Vector3> center_W;
+      for (int n = 0; n < 40; ++n) {
+        const double x_m = rng.uniform(4.5, 9.0) + half_m;
+        center_W.push_back(at_W + Vector3(x_m, x_m + rng.uniform(-0.9, 0.9) * half_m, 0.0));
+      }
+      const BlocksSeen seen = see_blocks(cameras, level, center_W);
+      const std::uint64_t all = (std::uint64_t{1} << center_W.size()) - 1;
+      EXPECT_EQ(seen.free, wall ? 0 : all) << level;
+      EXPECT_EQ(seen.mixed, wall ? all : 0) << level << ": a part of it may be free";
+    }
+  }
+}
+
 TEST_F(BlockSight, TheCellsOfARowAreWhereItsPixelsEnd) {
   const PosedDepthFrame& posed = frames_[4];  // looks up or down: one of them sees the ground
   const PosedDepthFrame& down = posed.X_WC.R_RT(2, 0) < 0.0 ? posed : frames_[5];

@@ -239,6 +239,47 @@ TEST_F(NoisyImages, FarSurfacesOfANoisyCameraAreUnknownUntilTheyAreNear) {
   EXPECT_GT(count(front, CellState::kOccupied), 100) << "0.17 m at 4 m";
 }
 
+/// A surface that a mixing camera shows is where it says with 1.5 sigma in a cell, or it is not occupied.
+TEST_F(NoisyImages, SurfacesOfAMixingCameraNeedMoreEvidence) {
+  const Aabb front{Vector3(7.85, -1.65, 1.05), Vector3(8.15, 1.65, 8.0)};
+  DepthError error{0.01, 0.0035};  // 0.23 m at 8 m
+  see([](auto&) {}, error);
+  EXPECT_GT(count(front, CellState::kOccupied), 200);
+  begin();
+  error.mixes = true;
+  see([](auto&) {}, error);
+  EXPECT_EQ(count(front, CellState::kOccupied), 0);
+  EXPECT_EQ(count(front, CellState::kFree), 0);
+}
+
+/// A pole of 5 cm at 5 m, met by every third image, with noise, with pixels that mix it with what is behind.
+TEST_F(NoisyImages, APoleIsKeptByACameraThatMixes) {
+  const test::Scene missed = scene_;
+  scene_.solid.push_back({Vector3(5.1, 1.972, 0), Vector3(5.15, 2.022, 12)});
+  const test::Scene seen = scene_;
+  const DepthError error{0.0, 0.0024, 0.003, 0.0035, true};
+  core::CounterRng rng(21);
+  const auto measure = [&](auto& image) {
+    const std::vector<float> true_m = image;
+    for (std::size_t i = 0; i + 1 < image.size(); ++i) {
+      const float far_m = std::min(true_m[i + 1], 20.0F);
+      if (true_m[i] > 4.9F && true_m[i] < 5.3F && far_m > 6.0F && rng.uniform() < 0.3)
+        image[i] += static_cast<float>(rng.uniform()) * (far_m - true_m[i]);
+      if (image[i] < 20.0F)
+        image[i] += static_cast<float>(rng.normal() * error.at_m(static_cast<double>(image[i])));
+    }
+  };
+  for (int n = 0; n < 60; ++n) {
+    scene_ = n % 3 == 0 ? seen : missed;
+    see(measure, error);
+    if (n < 12) continue;
+    int whole = 0;
+    for (double z = 4.05; z < 6.0; z += 0.3)
+      whole += count({Vector3(4.95, 1.95, z), Vector3(5.25, 1.95, z)}, CellState::kOccupied) > 0 ? 1 : 0;
+    ASSERT_EQ(whole, 7) << n;
+  }
+}
+
 /// A pole that falls between two pixels in nine of ten images.
 TEST_F(NoisyImages, APoleSeenOnceIsKept) {
   test::Scene missed = scene_;
@@ -271,6 +312,8 @@ TEST(PixelKinds, KnowsMixedAndThinOnes) {
   at(16, 4) = 7.0F;  // between it and what is behind
   at(8, 6) = 4.0F;   // a small thing alone
   at(3, 2) = kNan;
+  at(19, 7) = at(19, 8) = 8.0F;  // a pole that ends below what is nearer
+  for (std::size_t u = 18; u < 21; ++u) at(u, 5) = at(u, 6) = 6.0F;
   firmware_if::DepthFrame frame;
   frame.width = kWidth;
   frame.height = kHeight;
@@ -278,11 +321,14 @@ TEST(PixelKinds, KnowsMixedAndThinOnes) {
   frame.depth_m = depth;
   PixelRow row;
   for (std::size_t v = 0; v < kHeight; ++v) {
+    tell_pixels(frame, v, 0, kWidth, {0.3F, 0.0F, false}, row);
+    EXPECT_EQ((row.thin[0] >> 8U) & 1U, v == 6 ? 1U : 0U) << "of an ideal camera it is there";
+    EXPECT_EQ((row.thin[0] >> 19U) & 1U, v == 7 || v == 8 ? 1U : 0U) << v;
     tell_pixels(frame, v, 0, kWidth, {0.3F, 0.0F, true}, row);
     for (std::size_t u = 0; u < kWidth; ++u) {
       const bool is_lost = (u == 16 && v == 4) || (u == 3 && v == 2);
       EXPECT_EQ(row.depth_m[u], is_lost ? 0.0F : at(u, v)) << u << ", " << v;
-      EXPECT_EQ((row.thin[0] >> u) & 1U, u == 4 || (u == 8 && v == 6) ? 1U : 0U) << u << ", " << v;
+      EXPECT_EQ((row.thin[0] >> u) & 1U, u == 4 || (u == 19 && v == 8) ? 1U : 0U) << u << ", " << v;
     }
     // A part of a row is told as it is in the whole.
     const PixelRow whole = row;
