@@ -94,6 +94,8 @@ std::string words_of_ways(const Row& r) {
     return fmt::format("{:.1f} m to the goal (a metre that nobody has seen yet counts as {:g})",
                        r.number("way_m"), stages::kUnknownWeight);
   if (ways == "no path") return "all that can be reached was seen, and none of it leads to the goal";
+  if (ways == "infeasible")
+    return "none with the room that plans take; one that is narrower, or not seen, there may be";
   if (ways == "goal blocked") return "the vehicle fits nowhere near the goal";
   if (ways == "start blocked") return "no way is known from here, which proves nothing";
   if (ways == "budget spent") return "no time was left to look";

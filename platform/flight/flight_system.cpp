@@ -31,7 +31,7 @@ PipelineConfig pipeline_config(const FlightConfig& config) noexcept {
 stages::WayMemory::Config way_config(const FlightConfig& config) noexcept {
   using stages::WayMemory;
   WayMemory::Config ways{config.bounds_W, slow_radius_m(config.vehicle), lattice_of(config).finest_m,
-                         config.fence};
+                         config.fence, config.vehicle.radius_m};
   // A large world in larger cells: its surfaces would take more blocks than there are.
   constexpr double kPositionsPerBlock = 8.0;
   const bool is_large =

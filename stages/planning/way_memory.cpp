@@ -73,6 +73,12 @@ Extent extent_of(const WayMemory::Config& config) noexcept {
   return e;
 }
 
+/// Of the square inside the vehicle's circle, seen from above, so many cells as surely fit into it: however a gap lies.
+int core_width(const WayMemory::Config& config) noexcept {
+  constexpr double kInscribed = 0.7071;
+  return std::max(static_cast<int>(std::floor(2.0 * kInscribed * config.body_m / config.finest_m)), 1);
+}
+
 }  // namespace
 
 double WayMemory::positions(const Config& config) noexcept { return extent_of(config).blocks; }
@@ -91,6 +97,7 @@ std::size_t WayMemory::arena_bytes(const Config& config) noexcept {
 WayMemory::WayMemory(const Config& config, core::Arena& arena) noexcept
     : config_((ROBORUN_ASSERT(fits(config)), config)),
       width_(static_cast<int>(std::ceil(2.0 * config.radius_m / config.finest_m - 1e-6))),
+      core_width_(core_width(config)),
       position_(arena.take<Position>(static_cast<std::size_t>(extent_of(config).blocks), "way positions")),
       position_pool_(arena.last_pool()),
       block_(arena.take<Block>(config.max_blocks, "way blocks")),
@@ -320,10 +327,12 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   };
   const std::uint32_t position = position_of(block);
   std::int32_t& kind = position_[position].kind;
-  const std::int32_t uniform = all(places.known, 0xFFFF)                     ? kKnown
-                               : all(places.open, 0xFFFF)                    ? kOpen
-                               : all(places.known, 0) && all(places.open, 0) ? kClosed
-                                                                             : 0;
+  std::int32_t uniform = all(places.known, 0xFFFF) ? kKnown : all(places.open, 0xFFFF) ? kOpen : 0;
+  CellRows passable{};
+  if (uniform == 0) {
+    passable = find_passable(block, cells);
+    if (all(places.known, 0) && all(places.open, 0) && all(passable, 0)) uniform = kClosed;
+  }
   if (uniform < 0) {
     give_back(kind);
     kind = uniform;
@@ -332,6 +341,7 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   Block* b = take(position);
   if (b == nullptr) return;
   number_rooms(places, b->rooms);
+  b->passable = passable;
 }
 
 void WayMemory::find_doors(const Cell& block) noexcept {

@@ -31,6 +31,7 @@ class WayMemory final : public Ways {
     double radius_m{0.85};
     double finest_m{kPublishedCell_m};  ///< Edge of its cells: the map's finest, or twice that.
     core::Fence fence{};
+    double body_m{};               ///< Radius of the vehicle alone: that there is no way is proved for it.
     std::size_t max_blocks{9100};  ///< That are neither free all over nor unknown all over.
   };
   /// Blocks of the world.
@@ -67,6 +68,8 @@ class WayMemory final : public Ways {
     std::array<std::array<Door, kDoorsPerFace>, kFaces + 1> door{};
     std::array<std::uint8_t, kFaces + 1> doors{};
     std::uint32_t position{};  ///< Or, of a block that is not in use, the next such one.
+    CellRows passable{};       ///< Not proved to be closed.
+    CellRows passed{};         ///< Of these, what may_lead() has come to.
   };
   /// All of one kind, or the index of a Block.
   static constexpr std::int32_t kOpen = -1, kKnown = -2, kClosed = -3;
@@ -146,10 +149,28 @@ class WayMemory final : public Ways {
   [[nodiscard]] std::uint32_t step_cost(const Cell& from, const Cell& to, double price) const noexcept;
   void wait_at(const Vector3& p_W) noexcept;
 
+  /// Of a block: the places of what surely fits inside the body.
+  [[nodiscard]] CellRows find_passable(const Cell& block, const WayCells& cells) const noexcept;
+  /// kNoPath: none of what may be passable leads from one to the other, within what was seen; kInfeasible: some does;
+  /// kBudgetSpent.
+  [[nodiscard]] Status may_lead(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
+                                core::Work& work) noexcept;
+  /// A block that `rows` of may be come to from beside it.
+  void pass_into(const Cell& block, const CellRows& rows, const Cell& goal) noexcept;
+  /// From a block to the six beside it.
+  void pass_on(const Cell& block, const Cell& goal) noexcept;
+  [[nodiscard]] bool has_passed(const Cell& place) const noexcept;
+  [[nodiscard]] bool has_passed_near(const Cell& place) const noexcept;
+  /// Never seen, and the world goes on.
+  [[nodiscard]] bool passes_beyond(const Cell& block) const noexcept;
+  /// The place of the cube in the middle of the body.
+  [[nodiscard]] Cell core_at(const Vector3& p_W) const noexcept;
+
   Config config_;
-  int width_;      ///< Of the vehicle, in cells.
-  Cell corner_{};  ///< First cell of the first block, in cells from the world's origin.
-  Cell size_{};    ///< Blocks.
+  int width_;       ///< Of the vehicle, in cells.
+  int core_width_;  ///< Of what surely fits inside the body, however a gap lies.
+  Cell corner_{};   ///< First cell of the first block, in cells from the world's origin.
+  Cell size_{};     ///< Blocks.
   std::span<Position> position_;
   core::PoolRecord& position_pool_;
   std::size_t seen_count_{};

@@ -164,7 +164,7 @@ Status WayMemory::solve(const Vector3& from_W, const Vector3& goal_W, core::Stag
   if (is_settled(first)) return Status::kOk;
   if (overflown_) return Status::kBudgetSpent;
   // Of a room beside the vehicle no way may lead on while one leads on from the vehicle: no proof.
-  return room_at(place_of(from_W)) != 0 ? Status::kNoPath : Status::kStartBlocked;
+  return room_at(place_of(from_W)) != 0 ? may_lead(from_W, goal_W, budget, work) : Status::kStartBlocked;
 }
 
 double WayMemory::to_goal_m(const Vector3& p_W) const noexcept {

@@ -46,36 +46,6 @@ void spread(std::size_t side, int width, WideRows& rows) noexcept {
   }
 }
 
-/// All places that are connected with those of `room`, of those left in `rows`.
-void flood(const CellRows& rows, CellRows& room) noexcept {
-  const auto along_x = [](std::uint32_t seed, std::uint32_t row) {
-    for (std::uint32_t before = 0; seed != before;) {
-      before = seed;
-      seed |= ((seed << 1U) | (seed >> 1U)) & row;
-    }
-    return static_cast<std::uint16_t>(seed);
-  };
-  const auto grow = [&](std::size_t i) {
-    if (rows[i] == 0) return false;
-    std::uint32_t near = room[i];
-    if (i % kBlockCells > 0) near |= room[i - 1];
-    if (i % kBlockCells < kBlockCells - 1) near |= room[i + 1];
-    if (i >= kBlockCells) near |= room[i - kBlockCells];
-    if (i + kBlockCells < room.size()) near |= room[i + kBlockCells];
-    const std::uint16_t grown = along_x(near & rows[i], rows[i]);
-    const bool more = grown != room[i];
-    room[i] = grown;
-    return more;
-  };
-  // Each round there and back reaches at least one place more: a room has at most 4,096.
-  for (int round = 0; round < 4096; ++round) {
-    bool more = false;
-    for (std::size_t i = 0; i < room.size(); ++i) more = grow(i) || more;
-    for (std::size_t i = room.size(); i-- > 0;) more = grow(i) || more;
-    if (!more) return;
-  }
-}
-
 void number(CellRows rows, unsigned first, unsigned last, WayRooms& rooms) noexcept {
   std::size_t at = 0;
   for (unsigned next = first; next <= last; ++next) {
@@ -111,6 +81,35 @@ void find_places(const WayCells& cells, int width, WayPlaces& places) noexcept {
     const std::size_t at = kSide * (i / kBlockCells) + i % kBlockCells;
     places.known[i] = static_cast<std::uint16_t>(~blocked[at]);
     places.open[i] = static_cast<std::uint16_t>(blocked[at] & ~shut[at]);
+  }
+}
+
+void flood(const CellRows& rows, CellRows& room) noexcept {
+  const auto along_x = [](std::uint32_t seed, std::uint32_t row) {
+    for (std::uint32_t before = 0; seed != before;) {
+      before = seed;
+      seed |= ((seed << 1U) | (seed >> 1U)) & row;
+    }
+    return static_cast<std::uint16_t>(seed);
+  };
+  const auto grow = [&](std::size_t i) {
+    if (rows[i] == 0) return false;
+    std::uint32_t near = room[i];
+    if (i % kBlockCells > 0) near |= room[i - 1];
+    if (i % kBlockCells < kBlockCells - 1) near |= room[i + 1];
+    if (i >= kBlockCells) near |= room[i - kBlockCells];
+    if (i + kBlockCells < room.size()) near |= room[i + kBlockCells];
+    const std::uint16_t grown = along_x(near & rows[i], rows[i]);
+    const bool more = grown != room[i];
+    room[i] = grown;
+    return more;
+  };
+  // Each round there and back reaches at least one place more: a room has at most 4,096.
+  for (int round = 0; round < 4096; ++round) {
+    bool more = false;
+    for (std::size_t i = 0; i < room.size(); ++i) more = grow(i) || more;
+    for (std::size_t i = room.size(); i-- > 0;) more = grow(i) || more;
+    if (!more) return;
   }
 }
 

@@ -107,6 +107,52 @@ TEST_F(WayMemoryTest, ProvesThatThereIsNoWay) {
   EXPECT_EQ(sut_->to_goal_m(start_W_), kInfinity);
 }
 
+TEST_F(WayMemoryTest, AGapThatMayBeWideEnoughProvesNothing) {
+  // Three cells of it are free: as wide as a vehicle of 0.45 m, which plans with 0.55, and so with four cells.
+  config_.radius_m = 0.55;
+  config_.body_m = 0.45;
+  box(20, -21, 20.6, -0.4);
+  box(20, 0.5, 20.6, 21);
+  box(-15, 20, 20.6, 20.6);
+  box(-15, -20.6, 20.6, -20);
+  box(-15.6, -21, -15, 21);
+  make();
+  EXPECT_EQ(look_and_solve(start_W_), Status::kInfeasible);
+  EXPECT_EQ(sut_->to_goal_m(start_W_), kInfinity) << "no way to fly, either";
+  goal_W_ = Vector3(23, 0, 5);
+  EXPECT_EQ(look_and_solve(start_W_), Status::kInfeasible) << "inside what was seen, too";
+  box(20, -1, 20.6, 1);
+  EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath) << "closed";
+  goal_W_ = Vector3(80, 0, 5);
+  EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath);
+}
+
+TEST_F(WayMemoryTest, AHoleThatNothingWasSeenInProvesNothing) {
+  // Too narrow for any room, but nobody has seen what is there.
+  config_.radius_m = 0.55;
+  config_.body_m = 0.45;
+  box(-15, 20, 20.6, 20.6);
+  box(-15, -20.6, 20.6, -20);
+  box(-15.6, -21, -15, 21);
+  box(20, -21, 20.6, -0.2);
+  box(20, 0.2, 20.6, 21);
+  view_.free_W.max_W.x() = 20.3;
+  make();
+  EXPECT_EQ(look_and_solve(start_W_), Status::kInfeasible);
+}
+
+TEST_F(WayMemoryTest, AFenceThatClosesEverythingIsAProof) {
+  const std::array<core::FencePoint, 4> wall{{{10, -41}, {12, -41}, {12, 41}, {10, 41}}};
+  config_.body_m = 0.6;
+  ASSERT_EQ(config_.fence.add_polygon(core::FenceSide::kKeepOut, wall), core::FenceFault::kNone);
+  box(-15.6, -41, -15, 41);
+  view_.free_W = {Vector3(-25, -45, 0), Vector3(25, 45, 12)};
+  make();
+  EXPECT_EQ(sut_->look(view_, Vector3(0, 25, 5), 26.0, unlimited_, work_), Status::kOk);
+  EXPECT_EQ(sut_->look(view_, Vector3(0, -25, 5), 26.0, unlimited_, work_), Status::kOk);
+  EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath);
+}
+
 TEST_F(WayMemoryTest, ARoomBesideAVehicleThatStandsInNoneProvesNothing) {
   // Around a small closed cell, and the vehicle in its wall: too near to it on both sides.
   box(-2, -2, 2, -1.5), box(-2, 1.5, 2, 2), box(-2, -2, -1.5, 2), box(1.5, -2, 2, 2);

@@ -1,0 +1,176 @@
+#include <cmath>
+
+#include "stages/planning/way_memory.hpp"
+
+namespace roborun::stages {
+namespace {
+
+constexpr std::uint64_t kWorkOfAVisit = 8;  // lookups that a block counts as
+constexpr std::uint32_t kVisitsPerPoll = 16;
+constexpr std::uint32_t kMostVisits = 1U << 20U;
+constexpr std::int32_t kNear = 2;  // cells: what counts as the goal's
+constexpr std::size_t kRow = kBlockCells;
+constexpr std::array<std::array<std::int32_t, 3>, 6> kStep{
+    {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
+
+bool any(const CellRows& rows) noexcept {
+  std::uint16_t all = 0;
+  for (const std::uint16_t row : rows) all |= row;
+  return all != 0;
+}
+
+/// Of a block's places those at one face, as the places of the block beyond it that they touch.
+CellRows across(const CellRows& rows, std::size_t face) noexcept {
+  CellRows beyond{};
+  for (std::size_t i = 0; i < kRow; ++i) {
+    for (std::size_t k = 0; k < kRow; ++k) {
+      const std::size_t x_row = kRow * i + k;
+      const std::size_t near = face % 2 == 0 ? 0 : kRow - 1, far = kRow - 1 - near;
+      if (face / 2 == 0)
+        beyond[x_row] = static_cast<std::uint16_t>(face == 0 ? rows[x_row] >> 15U : rows[x_row] << 15U);
+      else if (face / 2 == 1 && k == near)
+        beyond[kRow * i + near] = rows[kRow * i + far];
+      else if (face / 2 == 2 && i == near)
+        beyond[kRow * near + k] = rows[kRow * far + k];
+    }
+  }
+  return beyond;
+}
+
+}  // namespace
+
+CellRows WayMemory::find_passable(const Cell& block, const WayCells& cells) const noexcept {
+  WayPlaces places;
+  find_places(cells, core_width_, places);
+  CellRows passable{};
+  for (std::size_t i = 0; i < passable.size(); ++i)
+    passable[i] = static_cast<std::uint16_t>(places.known[i] | places.open[i]);
+  const Cell first{kBlockCells * block.x, kBlockCells * block.y, kBlockCells * block.z};
+  const Aabb& bounds_W = config_.bounds_W;
+  const auto box_W = [&](const Cell& c, double wide) {
+    const Vector3 low(c.x + corner_.x, c.y + corner_.y, c.z + corner_.z);
+    const double middle = 0.5 * core_width_;
+    return Aabb{config_.finest_m * (low + Vector3::Constant(middle - wide)),
+                config_.finest_m * (low + Vector3::Constant(middle + wide))};
+  };
+  for (std::int32_t i = 0; i < 256; ++i) {
+    std::uint16_t& row = passable[static_cast<std::size_t>(i)];
+    for (unsigned bits = row; bits != 0; bits &= bits - 1) {
+      const std::int32_t x = __builtin_ctz(bits);
+      const Cell place{first.x + x, first.y + i % kBlockCells, first.z + i / kBlockCells};
+      // Where the vehicle's centre is while this is the cube inside it.
+      const Aabb centre_W = box_W(place, 0.5);
+      const bool inside = (centre_W.max_W.array() > bounds_W.min_W.array()).all() &&
+                          (centre_W.min_W.array() < bounds_W.max_W.array()).all();
+      if (!inside || (!config_.fence.empty() && !config_.fence.allows(box_W(place, 0.5 * core_width_))))
+        row = static_cast<std::uint16_t>(row & ~(1U << static_cast<unsigned>(x)));
+    }
+  }
+  return passable;
+}
+
+void WayMemory::pass_into(const Cell& block, const CellRows& rows, const Cell& goal) noexcept {
+  const std::uint32_t position = position_of(block);
+  const std::int32_t kind = kind_at(position);
+  if (kind == kClosed) return;
+  Node& n = node_[node_of(position, 0)];
+  const bool is_new = n.reached != search_;
+  if (kind < 0) {
+    if (!is_new || !any(rows)) return;
+  } else {
+    Block& b = block_[static_cast<std::size_t>(kind)];
+    if (is_new) b.passed = {};
+    std::uint16_t more = 0;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const auto added = static_cast<std::uint16_t>(rows[i] & b.passable[i] & ~b.passed[i]);
+      b.passed[i] = static_cast<std::uint16_t>(b.passed[i] | added);
+      more |= added;
+    }
+    if (is_new) n = {kFar, kNowhere, {}, search_, n.settled};
+    if (more == 0) return;
+  }
+  const bool waits = !is_new && n.cost == 0;
+  n = {0, kNowhere, {}, search_, n.settled};
+  if (waits) return;
+  const Vector3 away(block.x - goal.x, block.y - goal.y, block.z - goal.z);
+  const auto blocks = static_cast<std::uint64_t>(std::fmin(away.cwiseAbs().sum(), 1e9));
+  if (!reached_.push((blocks << 32U) | position)) overflown_ = true;
+}
+
+void WayMemory::pass_on(const Cell& block, const Cell& goal) noexcept {
+  const std::int32_t kind = kind_at(position_of(block));
+  CellRows all;
+  all.fill(0xFFFF);
+  if (kind >= 0) {
+    Block& b = block_[static_cast<std::size_t>(kind)];
+    flood(b.passable, b.passed);
+    all = b.passed;
+  }
+  for (std::size_t face = 0; face < kFaces; ++face) {
+    const Cell next{block.x + kStep[face][0], block.y + kStep[face][1], block.z + kStep[face][2]};
+    if (in_search(next)) pass_into(next, across(all, face), goal);
+  }
+}
+
+bool WayMemory::has_passed(const Cell& place) const noexcept {
+  const Cell block{place.x >> 4, place.y >> 4, place.z >> 4};
+  if (!has(block)) return false;
+  const std::uint32_t position = position_of(block);
+  if (node_[node_of(position, 0)].reached != search_) return false;
+  const std::int32_t kind = kind_at(position);
+  const auto row = static_cast<std::size_t>(kBlockCells * (place.z & 15) + (place.y & 15));
+  return kind < 0 ||
+         ((block_[static_cast<std::size_t>(kind)].passed[row] >> static_cast<unsigned>(place.x & 15)) & 1) !=
+             0;
+}
+
+WayMemory::Cell WayMemory::core_at(const Vector3& p_W) const noexcept {
+  const auto axis = [this](double p, std::int32_t corner) {
+    return static_cast<std::int32_t>(std::floor(p / config_.finest_m - 0.5 * core_width_ + 0.5)) - corner;
+  };
+  return {axis(p_W.x(), corner_.x), axis(p_W.y(), corner_.y), axis(p_W.z(), corner_.z)};
+}
+
+bool WayMemory::passes_beyond(const Cell& block) const noexcept {
+  const auto ends = [](std::int32_t b, std::int32_t low, std::int32_t high, std::int32_t size) {
+    return (b == low && b > 0) || (b == high && b < size - 1);
+  };
+  return ends(block.x, low_.x, high_.x, size_.x) || ends(block.y, low_.y, high_.y, size_.y) ||
+         ends(block.z, low_.z, high_.z, size_.z);
+}
+
+bool WayMemory::has_passed_near(const Cell& place) const noexcept {
+  for (std::int32_t i = 0; i < 125; ++i)
+    if (has_passed({place.x + i % 5 - kNear, place.y + i / 5 % 5 - kNear, place.z + i / 25 - kNear}))
+      return true;
+  return false;
+}
+
+Status WayMemory::may_lead(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
+                           core::Work& work) noexcept {
+  ++search_;
+  reached_.clear();
+  overflown_ = false;
+  const Cell start = core_at(from_W), goal = core_at(goal_W);
+  const Cell first{start.x >> 4, start.y >> 4, start.z >> 4};
+  const Cell last{goal.x >> 4, goal.y >> 4, goal.z >> 4};
+  if (!in_search(first)) return Status::kInfeasible;
+  CellRows from{};
+  from[static_cast<std::size_t>(kBlockCells * (start.z & 15) + (start.y & 15))] =
+      static_cast<std::uint16_t>(1U << static_cast<unsigned>(start.x & 15));
+  pass_into(first, from, last);
+  if (!has_passed(start)) return Status::kInfeasible;  // it is where nothing can be
+  for (std::uint32_t i = 1; !reached_.empty(); ++i) {
+    if (i > kMostVisits || (i % kVisitsPerPoll == 0 && budget.spent(work))) return Status::kBudgetSpent;
+    const auto position = static_cast<std::uint32_t>(reached_.pop());
+    work.units += kWorkOfAVisit;
+    const Cell block = block_at(position);
+    if (passes_beyond(block)) return Status::kInfeasible;
+    node_[node_of(position, 0)].cost = kFar;
+    pass_on(block, last);
+    if (has_passed_near(goal)) return Status::kInfeasible;
+  }
+  return overflown_ ? Status::kBudgetSpent : Status::kNoPath;
+}
+
+}  // namespace roborun::stages
