@@ -83,6 +83,13 @@ std::string words_of_active(const std::string& active) {
   return text.empty() ? "  none\n" : text;
 }
 
+/// "camera 1 fog+camera 2 turned" as a list.
+std::string words_of_refused(std::string refused) {
+  for (std::size_t at = refused.find('+'); at != std::string::npos; at = refused.find('+', at))
+    refused.replace(at, 1, ", ");
+  return refused;
+}
+
 std::string metres(const Row& r, const char* key) {
   const double x = r.number(key);
   return std::isfinite(x) ? fmt::format("{:.1f} m", x) : "none in view";
@@ -157,6 +164,8 @@ std::string explain_decision(const std::string& name, const std::string& csv, do
       "the map.\n",
       metres(r, "closest_obstacle_m"), metres(r, "gap_average_m"), metres(r, "visible_m"),
       r.number("sensor_volume_m3"), r.number("map_volume_m3"));
+  if (!r.text("refused").empty())
+    text += fmt::format("Not believed  {}.\n", words_of_refused(r.text("refused")));
   text += fmt::format("How long      {:.2f} s until it must have decided, {:.2f} s granted. Set by {}.\n",
                       r.number("time_budget_s"), r.number("deadline_s"), words_of_source(r));
   text += fmt::format(

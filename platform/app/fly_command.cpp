@@ -90,6 +90,29 @@ bool believes(const FlyOptions& options, const report::MissionReport& flown) {
   return believed;
 }
 
+/// Lines on what was seen and not believed; none if all was.
+std::string words_of_refused(const report::MissionResult& r) {
+  std::string text;
+  std::string sensor;
+  for (const report::RefusedRecord& one : r.refused) {
+    text += one.sensor == sensor ? "," : fmt::format("{}  {}:", sensor.empty() ? "" : ";", one.sensor);
+    text += fmt::format(" {} {}", one.images, one.reason);
+    sensor = one.sensor;
+  }
+  if (!text.empty()) text = fmt::format("{:<12} refused images{}\n", r.design, text);
+  if (r.map_drops > 0) text += fmt::format("{:<12} dropped its map {} times\n", r.design, r.map_drops);
+  return text;
+}
+
+/// Lines on what the failsafe did, if it did anything.
+std::string words_of_failsafe(const report::MissionReport& r) {
+  std::string text;
+  for (const report::FailsafeRecord& action : r.safety.actions)
+    text += fmt::format("{:<12} {:.1f} s: {} ({}{}{})\n", r.result.design, action.time_s, action.action,
+                        fmt::join(action.conditions, ", "), action.sensor.empty() ? "" : "; ", action.sensor);
+  return text;
+}
+
 int fly(const FlyOptions& options) {
   // Everything is checked before the first metre is flown.
   std::vector<governor::Design> designs;
@@ -200,8 +223,9 @@ int fly(const FlyOptions& options) {
     results.reserve(reports.size());
     for (const report::MissionReport& r : reports) results.push_back(r.result);
     fmt::print("{}\n\n{}", title, report::comparison_table(results));
-    for (const report::MissionResult& r : results)
-      fmt::print("{:<12} state_hash {}, {:.0f} x real time\n", r.design, r.state_hash, r.real_time_factor);
+    for (const report::MissionReport& r : reports)
+      fmt::print("{:<12} state_hash {}, {:.0f} x real time\n{}{}", r.result.design, r.result.state_hash,
+                 r.result.real_time_factor, words_of_failsafe(r), words_of_refused(r.result));
   }
   if (!options.trace.empty()) input::write_file(options.trace, report::trace_csv(reports));
   if (!options.plot.empty()) {

@@ -133,9 +133,32 @@ void DecisionProgram::judge_frames(bool airborne) noexcept {
     disagree += disagrees[i] ? 1 : 0;
     agree += agreement == Agreement::kAgrees ? 1 : 0;
   }
-  if (disagree > 1 && agree == 0) return pipeline_.forget();
+  if (disagree > 1 && agree == 0) return drop_map();
   for (std::size_t i = 0; i < frames_.size(); ++i)
     if (disagrees[i]) fault_[i] = stages::FrameFault::kTurned;
+}
+
+void DecisionProgram::drop_map() noexcept {
+  pipeline_.forget();
+  ++map_drops_;
+}
+
+void DecisionProgram::note(std::size_t frame, bool airborne, MonotonicTime now) noexcept {
+  const std::size_t sensor = sensor_of_[frame];
+  const stages::PosedDepthFrame& posed = frames_[frame];
+  const bool usable = fault_[frame] == stages::FrameFault::kNone;
+  const bool was_fine = last_fault_[sensor] == stages::FrameFault::kNone;
+  last_fault_[sensor] = fault_[frame];
+  // On the ground and close to it a camera may see nothing: all of it is nearer than its least range, which a product has
+  // whatever the frame says.
+  const bool may_be_dark = !airborne && (posed.frame.range_min_m > 0.0F || posed.error.dark_sky);
+  if (usable || may_be_dark)
+    last_usable_[sensor] = posed.frame.stamp;
+  else if (was_fine)
+    last_usable_[sensor] = now;
+  if (usable) return;
+  (void)refused_now_.push_back({sensor, fault_[frame]});
+  ++refused_[sensor][static_cast<std::size_t>(fault_[frame])];
 }
 
 void DecisionProgram::report_depth(MonotonicTime now) noexcept {
@@ -159,17 +182,12 @@ void DecisionProgram::look(const FlightReport& report, MonotonicTime now) noexce
   judge_frames(report.airborne);
   std::size_t kept = 0;
   in_.scans.clear();
+  refused_now_.clear();
   std::array<std::size_t, 1 + kMostLidars> scan{};
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     const std::size_t sensor = sensor_of_[i];
-    const bool usable = fault_[i] == stages::FrameFault::kNone;
-    last_fault_[sensor] = fault_[i];
-    // On the ground and close to it a camera may see nothing: all of it is nearer than its least range, which a product has
-    // whatever the frame says.
-    const bool may_be_dark =
-        !report.airborne && (frames_[i].frame.range_min_m > 0.0F || frames_[i].error.dark_sky);
-    if (usable || may_be_dark) last_usable_[sensor] = frames_[i].frame.stamp;
-    if (!usable) continue;
+    note(i, report.airborne, now);
+    if (fault_[i] != stages::FrameFault::kNone) continue;
     ++scan[sensor < kMostCameras ? 0 : 1 + sensor - kMostCameras];
     frames_[kept++] = frames_[i];
   }
@@ -191,7 +209,7 @@ void DecisionProgram::gather(core::LaneExecutive& lane) noexcept {
     return;
   }
   if (state.map_number != map_number_) {
-    pipeline_.forget();
+    drop_map();
     map_number_ = state.map_number;
   }
   look(report, lane.release());

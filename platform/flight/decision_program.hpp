@@ -33,6 +33,16 @@ namespace roborun::flight {
 inline constexpr double kSureWithin_m = 0.06;
 inline constexpr double kSureWithin_rad = 0.025;
 
+/// An image that was not believed.
+struct RefusedImage {
+  std::size_t sensor{};  ///< A camera, or kMostCameras + a LiDAR.
+  stages::FrameFault fault{};
+};
+/// How many, by sensor and FrameFault; never decrease.
+using RefusedCounts =
+    std::array<std::array<std::uint64_t, static_cast<std::size_t>(stages::FrameFault::kTurned) + 1>,
+               kMostCameras + kMostLidars>;
+
 class DecisionProgram final : public core::LaneProgram {
  public:
   struct Config {
@@ -63,6 +73,13 @@ class DecisionProgram final : public core::LaneProgram {
   [[nodiscard]] Status give_goals(std::span<const Vector3> goals_W) noexcept { return goals_.give(goals_W); }
   /// For the decision lane's thread, or between the frames of a flight in lockstep.
   [[nodiscard]] const GoalQueue& goals() const noexcept { return goals_; }
+  /// Of the newest look; a sensor that was silent is not among them.
+  [[nodiscard]] std::span<const RefusedImage> refused_now() const noexcept {
+    return {refused_now_.begin(), refused_now_.size()};
+  }
+  [[nodiscard]] const RefusedCounts& refused() const noexcept { return refused_; }
+  /// How often the map was dropped: what was seen lay elsewhere; never decreases.
+  [[nodiscard]] std::uint64_t map_drops() const noexcept { return map_drops_; }
   /// Trajectories that came too late for their own start; never decreases.
   [[nodiscard]] std::uint64_t too_late() const noexcept { return too_late_; }
 
@@ -74,6 +91,10 @@ class DecisionProgram final : public core::LaneProgram {
   /// fault_ of what was read. One camera that disagrees with the map all over while another one agrees, or that is the only one that
   /// can tell, was turned: its images are not believed. If all disagree, it is the estimate: the map is dropped.
   void judge_frames(bool airborne) noexcept;
+  void drop_map() noexcept;
+  /// Notes what became of an image: a sensor is out of use since its last image that was usable, or, if its newest ones are
+  /// refused, since the first of those. A decision may take longer than the failsafe waits: one refused image is no lost sensor.
+  void note(std::size_t frame, bool airborne, MonotonicTime now) noexcept;
   /// The sensor that is worst off, for the failsafe.
   void report_depth(MonotonicTime now) noexcept;
   /// Adds the newest images of all cameras, or those of a LiDAR's newest sweep.
@@ -111,10 +132,13 @@ class DecisionProgram final : public core::LaneProgram {
   Trajectory handed_over_{};
   DecisionReport report_{};
   stages::FrameGuard guard_{};
-  std::array<MonotonicTime, kMostCameras + kMostLidars> last_usable_{};  ///< By sensor.
+  std::array<MonotonicTime, kMostCameras + kMostLidars> last_usable_{};  ///< By sensor: see note().
   std::array<stages::FrameFault, kMostCameras + kMostLidars>
       last_fault_{};                                     ///< The same, of its newest image.
   std::array<stages::FrameFault, kMostImages> fault_{};  ///< By frame.
+  core::StaticVector<RefusedImage, kMostImages> refused_now_;
+  RefusedCounts refused_{};
+  std::uint64_t map_drops_{0};
   std::uint64_t refusals_before_{0};
   std::uint32_t map_number_{0};  ///< EstimatedState::map_number of what is in the map.
 };

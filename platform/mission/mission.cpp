@@ -65,12 +65,36 @@ report::KnownSlice known_slice(const stages::MapView& view, const Aabb& bounds_W
   return slice;
 }
 
+/// "camera 1", "lidar 2".
+std::string sensor_name(std::size_t sensor) {
+  const bool is_camera = sensor < kMostCameras;
+  return fmt::format("{} {}", is_camera ? "camera" : "lidar", sensor - (is_camera ? 0 : kMostCameras) + 1);
+}
+
 /// "camera 1: covered".
 std::string sensor_of(const flight::FailsafeEvent& e) {
-  const bool is_camera = e.depth_sensor < kMostCameras;
-  return fmt::format("{} {}: {}", is_camera ? "camera" : "lidar",
-                     e.depth_sensor - (is_camera ? 0 : kMostCameras) + 1,
+  return fmt::format("{}: {}", sensor_name(e.depth_sensor),
                      e.depth_fault == stages::FrameFault::kNone ? "silent" : to_string(e.depth_fault));
+}
+
+/// "camera 1 fog+camera 2 turned"; each once, though a LiDAR has six images.
+std::string text_of(std::span<const flight::RefusedImage> refused) {
+  std::string text;
+  for (const flight::RefusedImage& image : refused) {
+    const std::string one = fmt::format("{} {}", sensor_name(image.sensor), to_string(image.fault));
+    if (text.find(one) == std::string::npos) text += (text.empty() ? "" : "+") + one;
+  }
+  return text;
+}
+
+std::vector<report::RefusedRecord> records_of(const flight::RefusedCounts& refused) {
+  std::vector<report::RefusedRecord> records;
+  for (std::size_t sensor = 0; sensor < refused.size(); ++sensor)
+    for (std::size_t fault = 0; fault < refused[sensor].size(); ++fault)
+      if (refused[sensor][fault] > 0)
+        records.push_back(
+            {sensor_name(sensor), to_string(static_cast<stages::FrameFault>(fault)), refused[sensor][fault]});
+  return records;
 }
 
 constexpr const char* kCustom = "custom";  // what the caller brought, in reports
@@ -287,6 +311,7 @@ void MissionRun::record_decision(const flight::DecisionOutput& out) {
   r.way_m = out.way_m;
   r.planner_status = to_string(out.planner_status);
   r.smoother_status = to_string(out.smoother_status);
+  r.refused = text_of(system_.decision_program().refused_now());
   r.missed = out.latency > point.deadline;
   hash_.add(r.latency_s);
   hash_.add(r.deadline_s);
@@ -319,6 +344,8 @@ void MissionRun::summarise(double wall_s) {
   r.precision_m = {quantile(precision_m, 0.0), quantile(precision_m, 0.5), quantile(precision_m, 1.0)};
   r.real_time_factor = wall_s > 0.0 ? r.mission_time_s / wall_s : 0.0;
   r.map_bytes = system_.map().bytes();
+  r.refused = records_of(system_.decision_program().refused());
+  r.map_drops = system_.decision_program().map_drops();
   r.speed_limit_mps = system_.policy().v_max_mps();
   hash_.add(system_.map().digest());
   r.state_hash = fmt::format("{:016x}", hash_.value());

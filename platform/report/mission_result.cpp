@@ -44,6 +44,10 @@ std::string to_json(const MissionResult& r) {
                              {"answer", g.answer},
                              {"time_s", g.time_s},
                              {"distance_m", g.distance_m}});
+  json["refused"] = Json::object();
+  for (const RefusedRecord& refused : r.refused)
+    json["refused"][refused.sensor][refused.reason] = refused.images;
+  json["map_drops"] = r.map_drops;
   if (r.suite) {
     json["possible"] = r.suite->possible;
     json["shortest_m"] = r.suite->shortest_m;

@@ -34,6 +34,13 @@ struct GoalRecord {
   double distance_m{};  ///< From the vehicle then.
 };
 
+/// Images of one sensor that were not believed, for one reason.
+struct RefusedRecord {
+  std::string sensor;  ///< camera 1, lidar 2, counted from 1.
+  std::string reason;  ///< A stages::FrameFault's name.
+  std::uint64_t images{};
+};
+
 /// Names and order are those of the JSON object.
 struct MissionResult {
   std::string design;
@@ -64,6 +71,9 @@ struct MissionResult {
   double speed_limit_mps{};       ///< v_max of the design.
   bool believed{true};            ///< False: a plugin took more time than the work that it counted is worth.
   std::vector<GoalRecord> goals;  ///< One more key, or none: a mission with the world's goal alone.
+  /// By sensor, then reason; in JSON {"camera 1": {"fog": 3}}.
+  std::vector<RefusedRecord> refused;
+  std::uint64_t map_drops{};         ///< The map was dropped: what was seen lay elsewhere.
   std::optional<SuiteFlight> suite;  ///< Three more keys, or none.
 };
 
@@ -96,6 +106,7 @@ struct DecisionRecord {
   double way_m{};           ///< DecisionOutput::way_m.
   std::string planner_status;
   std::string smoother_status;
+  std::string refused;  ///< Images of this decision: "camera 1 fog", with + between.
   bool missed{};
 };
 

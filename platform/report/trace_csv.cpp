@@ -13,7 +13,7 @@ std::string trace_csv(std::span<const MissionReport> missions) {
     text += fmt::format(",{0}_s,{0}_predicted_s", core::to_string(static_cast<core::StageId>(i)));
   text +=
       ",visible_m,closest_obstacle_m,gap_average_m,sensor_volume_m3,map_volume_m3,demand_m,solver,active,"
-      "ways,way_m,planner,smoother,missed\n";
+      "ways,way_m,planner,smoother,refused,missed\n";
   for (const MissionReport& mission : missions) {
     for (const DecisionRecord& d : mission.decisions) {
       text += fmt::format(
@@ -24,10 +24,10 @@ std::string trace_csv(std::span<const MissionReport> missions) {
           d.budget_source, d.deadline_s, d.latency_s);
       for (std::size_t i = 0; i < core::kStageCount; ++i)
         text += fmt::format(",{:.6f},{:.6f}", d.stage_s[i], d.predicted_s[i]);
-      text += fmt::format(",{:.2f},{:.2f},{:.2f},{:.0f},{:.0f},{:.3f},{},{},{},{:.1f},{},{},{}\n",
+      text += fmt::format(",{:.2f},{:.2f},{:.2f},{:.0f},{:.0f},{:.3f},{},{},{},{:.1f},{},{},{},{}\n",
                           d.visible_m, d.closest_obstacle_m, d.gap_average_m, d.sensor_volume_m3,
                           d.map_volume_m3, d.demand_m, d.solver, d.active, d.ways_status, d.way_m,
-                          d.planner_status, d.smoother_status, d.missed ? 1 : 0);
+                          d.planner_status, d.smoother_status, d.refused, d.missed ? 1 : 0);
     }
   }
   return text;

@@ -28,6 +28,7 @@ std::string trace() {
   missions[0].decisions[7].missed = true;
   missions[1].decisions[3].ways_status = "no path";
   missions[1].decisions[4].ways_status = "not ready";
+  missions[0].decisions[7].refused = "camera 1 fog+camera 2 turned";
   const std::string path = test::scratch("explain.csv");
   input::write_file(path, report::trace_csv(missions));
   std::ifstream file(path);
@@ -41,6 +42,8 @@ TEST(Explain, NamesTheDecisionInForceAndEverythingThatSetIt) {
   EXPECT_NE(text.find("0.1250"), std::string::npos) << "predicted time of the map";
   EXPECT_NE(text.find("all the time is used"), std::string::npos);
   EXPECT_NE(text.find("nearest obstacle"), std::string::npos);
+  EXPECT_NE(text.find("Not believed  camera 1 fog, camera 2 turned."), std::string::npos) << text;
+  EXPECT_EQ(explain_decision("t.csv", trace(), 3.0, "").find("Not believed"), std::string::npos);
   EXPECT_NE(text.find("LATE"), std::string::npos);
   EXPECT_NE(text.find("Which way     585.0 m to the goal"), std::string::npos) << text;
   EXPECT_NE(explain_decision("t.csv", trace(), 3.0, "static").find("Decision 4 of static"),

@@ -117,7 +117,8 @@ TEST_F(OwnPartsTest, WaysThatAskTheMemoryThatShipsFlyTheSameBits) {
   const std::string hash = fly_mission(world_, config_, {}).result.state_hash;
   int solved = 0;
   config_.own.ways = [&solved](const board::PartRequest& r) {
-    const stages::WayMemory::Config config{r.flight_bounds_W, r.room_m, r.images.lattice.finest_m, r.fence};
+    const stages::WayMemory::Config config{r.flight_bounds_W, r.room_m, r.images.lattice.finest_m, r.fence,
+                                           r.images.vehicle_radius_m};
     return std::make_unique<PassingWays>(config, solved);
   };
   const report::MissionResult own = fly_mission(world_, config_, {}).result;

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "platform/report/result_line.hpp"
 #include "tests/platform/report/sample.hpp"
 
 namespace roborun::report {
@@ -41,6 +42,22 @@ TEST(MissionResult, JsonHasTheFixedKeysInTheirOrder) {
   EXPECT_EQ(json["mean_velocity_mps"], 4.0);
   for (const char* key : {"median", "p99", "max"}) EXPECT_TRUE(json["latency_s"].contains(key));
   for (const char* key : {"min", "median", "max"}) EXPECT_TRUE(json["precision_m"].contains(key));
+}
+
+TEST(MissionResult, CountsRefusedImagesBySensorAndReasonAndReadsThemBack) {
+  MissionResult r = test::sample_mission("aware", 4.0).result;
+  EXPECT_EQ(nlohmann::json::parse(to_json(r))["refused"], nlohmann::json::object()) << "none";
+  r.refused = {{"camera 1", "fog", 3}, {"camera 1", "turned", 1}, {"lidar 1", "stamp", 2}};
+  r.map_drops = 4;
+  const auto json = nlohmann::json::parse(to_json(r));
+  EXPECT_EQ(json["refused"]["camera 1"]["fog"], 3);
+  EXPECT_EQ(json["refused"]["lidar 1"]["stamp"], 2);
+  EXPECT_EQ(json["map_drops"], 4);
+  r.map = r.planner = "own";
+  const auto back = from_line(to_line(r));
+  ASSERT_TRUE(back.has_value());
+  EXPECT_EQ(to_line(*back), to_line(r));
+  ASSERT_EQ(back->refused.size(), 3U);
 }
 
 TEST(MissionResult, WhatIsNotFiniteIsNullAndTextIsAlwaysValid) {

@@ -28,5 +28,16 @@ TEST(TraceCsv, HasAHeaderALineADecisionAndAsManyFieldsEverywhere) {
   EXPECT_EQ(lines, 41U);
 }
 
+TEST(TraceCsv, SaysWhichImagesOfADecisionWereRefused) {
+  std::vector<MissionReport> missions = {test::sample_mission("aware", 4.0)};
+  missions[0].decisions[1].refused = "camera 1 fog+camera 2 turned";
+  std::istringstream text(trace_csv(missions));
+  std::string header, none, two;
+  ASSERT_TRUE(std::getline(text, header) && std::getline(text, none) && std::getline(text, two));
+  EXPECT_NE(header.find("planner,smoother,refused,missed"), std::string::npos) << header;
+  EXPECT_TRUE(none.ends_with(",ok,ok,,0")) << none;
+  EXPECT_TRUE(two.ends_with(",ok,ok,camera 1 fog+camera 2 turned,0")) << two;
+}
+
 }  // namespace
 }  // namespace roborun::report
