@@ -273,17 +273,44 @@ struct InHoles {
 /// what it hides may be large, too.
 HWY_INLINE InHoles in_holes(const Look& look, bool are_cells, unsigned blocks) {
   InHoles result;
-  for (; blocks != 0; blocks &= blocks - 1) {
-    const auto i = static_cast<unsigned>(__builtin_ctz(blocks));
-    const PixelBoxes& p = look.pixels;
-    const DepthPyramid::Share share = look.pyramid->share(p.u0[i], p.v0[i], p.u1[i], p.v1[i]);
-    const bool enough = are_cells ? 8 * share.seen >= 7 * share.pixels : share.seen == share.pixels;
-    if (enough) continue;
-    unsigned& kind = share.seen == 0                               ? result.dark
-                     : are_cells && 2 * share.seen >= share.pixels ? result.in_part
-                                                                   : result.sparse;
-    kind |= 1U << i;
+  if (blocks == 0) return result;
+  const Ints di;
+  const DepthPyramid::SeenSums sums = look.pyramid->seen_sums();
+  const auto set = [&](std::int32_t value) { return hn::Set(di, value); };
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(di)) {
+    const auto tile = [&](const std::int32_t* pixel) {
+      return hn::ShiftRightSame(hn::Load(di, pixel + i), sums.shift);
+    };
+    const auto x0 = tile(look.pixels.u0), x1 = hn::Add(tile(look.pixels.u1), set(1));
+    const auto y0 = tile(look.pixels.v0), y1 = hn::Add(tile(look.pixels.v1), set(1));
+    const auto above = hn::Mul(y0, set(sums.row)), below = hn::Mul(y1, set(sums.row));
+    alignas(32) std::int32_t corner[4][8], seen_pixels[8];
+    hn::Store(hn::Add(below, x1), di, corner[0]);
+    hn::Store(hn::Add(below, x0), di, corner[1]);
+    hn::Store(hn::Add(above, x1), di, corner[2]);
+    hn::Store(hn::Add(above, x0), di, corner[3]);
+    for (std::size_t k = 0; k < hn::Lanes(di); ++k)
+      seen_pixels[k] = static_cast<std::int32_t>(sums.seen[corner[0][k]] - sums.seen[corner[1][k]] -
+                                                 sums.seen[corner[2][k]] + sums.seen[corner[3][k]]);
+    const auto seen = hn::Load(di, seen_pixels);
+    const auto side = [&](auto from, auto to, std::int32_t most) {
+      return hn::Sub(hn::Min(hn::ShiftLeftSame(to, sums.shift), set(most)),
+                     hn::ShiftLeftSame(from, sums.shift));
+    };
+    const auto pixels = hn::Mul(side(x0, x1, sums.width), side(y0, y1, sums.height));
+    const auto lost = hn::Sub(pixels, seen);
+    const auto bits = [](auto is) { return bits_of(hn::RebindMask(Floats(), is)); };
+    const unsigned few =
+        bits(are_cells ? hn::Gt(hn::ShiftLeft<3>(lost), pixels) : hn::Gt(lost, hn::Zero(di)));
+    const unsigned none = bits(hn::Eq(seen, hn::Zero(di)));
+    const unsigned half = are_cells ? ~bits(hn::Gt(lost, seen)) : 0U;
+    result.dark |= (few & none) << i;
+    result.in_part |= (few & half & ~none) << i;
+    result.sparse |= (few & ~half & ~none) << i;
   }
+  result.dark &= blocks;
+  result.in_part &= blocks;
+  result.sparse &= blocks;
   return result;
 }
 

@@ -66,31 +66,22 @@ DepthPyramid::DepthPyramid(core::Arena& arena, std::size_t max_width, std::size_
   arena.last_pool().use(seen_.size());
 }
 
-void DepthPyramid::count_strip(const firmware_if::DepthFrame& frame, std::size_t y, unsigned shift,
-                               const StripSeen& strip, Entry* tile) noexcept {
-  const std::size_t columns = (frame.width + (std::size_t{1} << shift) - 1) >> shift, row = columns + 1;
-  std::uint32_t* const above = seen_.data() + (y >> shift) * row;
-  std::uint32_t* const below = above + row;
+bool DepthPyramid::bridge_strip(const firmware_if::DepthFrame& frame, std::size_t y, unsigned shift,
+                                const StripSeen& strip, Entry* tile) noexcept {
+  const std::size_t columns = (frame.width + (std::size_t{1} << shift) - 1) >> shift;
   const std::size_t bottom = std::min<std::size_t>(y + (std::size_t{1} << shift), frame.height);
-  const auto before = [&](std::size_t x) { return std::min<std::size_t>(x << shift, frame.width); };
-  if (!has_holes_) {
-    // All rows above were whole.
-    for (std::size_t v = 0; v <= y >> shift; ++v)
-      for (std::size_t x = 0; x <= columns; ++x)
-        seen_[v * row + x] = static_cast<std::uint32_t>((v << shift) * before(x));
-    has_holes_ = true;
-  }
-  for (std::size_t x = 0; x < columns; ++x)
-    below[x + 1] = static_cast<std::uint32_t>((before(x + 1) - before(x)) * (bottom - y));
+  bool any_lost = false;
   const auto look_at = [&](std::size_t u, std::size_t v) {
     if (frame.depth_m[v * frame.width + u] > frame.range_min_m) return;
     const float nearest_m = bridged_m(frame, u, v);
-    Entry& entry = tile[u >> shift];
     if (nearest_m > 0.0F) {
+      Entry& entry = tile[u >> shift];
       entry = min_of(entry, entry_of(nearest_m, frame.range_m, steps_per_m_));
-    } else {
-      --below[(u >> shift) + 1];
+      return;
     }
+    if (!any_lost) std::fill_n(lost_.begin(), columns, std::uint8_t{0});
+    any_lost = true;
+    ++lost_[u >> shift];
   };
   for (std::size_t word = 0; word < StripSeen::kWords; ++word) {
     for (std::uint64_t bits = strip.incomplete[word]; bits != 0; bits &= bits - 1) {
@@ -99,11 +90,28 @@ void DepthPyramid::count_strip(const firmware_if::DepthFrame& frame, std::size_t
         for (std::size_t u = first; u < std::min<std::size_t>(first + 8, frame.width); ++u) look_at(u, v);
     }
   }
+  return any_lost;
+}
+
+void DepthPyramid::count_strip(const firmware_if::DepthFrame& frame, std::size_t y, unsigned shift,
+                               bool any_lost) noexcept {
+  const std::size_t columns = (frame.width + (std::size_t{1} << shift) - 1) >> shift, row = columns + 1;
+  std::uint32_t* const above = seen_.data() + (y >> shift) * row;
+  std::uint32_t* const below = above + row;
+  const std::size_t rows = std::min<std::size_t>(std::size_t{1} << shift, frame.height - y);
+  const auto before = [&](std::size_t x) { return std::min<std::size_t>(x << shift, frame.width); };
+  if (!has_holes_) {
+    // All rows above were whole.
+    for (std::size_t v = 0; v <= y >> shift; ++v)
+      for (std::size_t x = 0; x <= columns; ++x)
+        seen_[v * row + x] = static_cast<std::uint32_t>((v << shift) * before(x));
+    has_holes_ = true;
+  }
+  std::uint32_t lost = 0;
   below[0] = 0;
-  std::uint32_t sum = 0;
   for (std::size_t x = 1; x <= columns; ++x) {
-    sum += below[x];
-    below[x] = above[x] + sum;
+    if (any_lost) lost += lost_[x - 1];
+    below[x] = above[x] + static_cast<std::uint32_t>(before(x) * rows) - lost;
   }
 }
 
@@ -120,9 +128,8 @@ void DepthPyramid::fill_tiles(const firmware_if::DepthFrame& frame, unsigned shi
                            steps_per_m_};
     const StripSeen seen = tile_steps(strip, static_cast<int>(shift), tile);
     shows_surface_ = shows_surface_ || seen.surface;
-    const bool whole = std::all_of(seen.incomplete.begin(), seen.incomplete.end(),
-                                   [](std::uint64_t word) { return word == 0; });
-    if (!whole || has_holes_) count_strip(frame, y, shift, seen, tile);
+    const bool lost = bridge_strip(frame, y, shift, seen, tile);
+    if (lost || has_holes_) count_strip(frame, y, shift, lost);
   }
   shows_anything_ = !has_holes_ || seen_[((frame.height + side - 1) >> shift) * (columns + 1) + columns] > 0;
 }

@@ -60,33 +60,30 @@ class DepthPyramid {
   /// Whether a pixel has information, and whether one shows a surface.
   [[nodiscard]] bool shows_anything() const noexcept { return shows_anything_; }
   [[nodiscard]] bool has_holes() const noexcept { return has_holes_; }
-  /// How many of some pixels are not in a hole.
-  struct Share {
-    std::uint32_t seen, pixels;
+  /// How many pixels are not in a hole, as sums over tiles of 2^shift pixels a side: of the tiles [x0, x1) x [y0, y1) it is
+  /// seen[y1 row + x1] - seen[y1 row + x0] - seen[y0 row + x1] + seen[y0 row + x0].
+  struct SeenSums {
+    const std::uint32_t* seen{};
+    std::int32_t row{};
+    int shift{};
+    std::int32_t width{}, height{};  ///< Of the image, in pixels.
   };
-  /// Of the tiles that hold the pixels [u0, u1] x [v0, v1]. Precondition: has_holes(). O(1).
-  [[nodiscard]] Share share(std::int32_t u0, std::int32_t v0, std::int32_t u1,
-                            std::int32_t v1) const noexcept {
-    const auto shift = static_cast<unsigned>(level_[0].shift);
-    const auto x0 = static_cast<std::uint32_t>(u0) >> shift,
-               x1 = (static_cast<std::uint32_t>(u1) >> shift) + 1U;
-    const auto y0 = static_cast<std::uint32_t>(v0) >> shift,
-               y1 = (static_cast<std::uint32_t>(v1) >> shift) + 1U;
-    const std::uint32_t row = static_cast<std::uint32_t>(level_[0].width) + 1U;
-    const std::uint32_t *above = seen_.data() + std::size_t{y0} * row,
-                        *below = seen_.data() + std::size_t{y1} * row;
-    return {
-        below[x1] - below[x0] - above[x1] + above[x0],
-        (std::min(x1 << shift, width_) - (x0 << shift)) * (std::min(y1 << shift, height_) - (y0 << shift))};
+  /// Precondition: has_holes(). O(1).
+  [[nodiscard]] SeenSums seen_sums() const noexcept {
+    return {seen_.data(), level_[0].width + 1, level_[0].shift, static_cast<std::int32_t>(width_),
+            static_cast<std::int32_t>(height_)};
   }
   [[nodiscard]] bool shows_surface() const noexcept { return shows_surface_; }
   /// Pixels [u0, u1] x [v0, v1], inside the image. Conservative. O(1).
   [[nodiscard]] Bound bound(int u0, int v0, int u1, int v1) const noexcept;
 
  private:
-  /// The strip of tiles from row y on has pixels without information, or one above it has: counts what is seen of it.
+  /// Adds pixels that count as a neighbour to their tiles in the strip from row y on. True: others are in a hole, in lost_ by tile.
+  [[nodiscard]] bool bridge_strip(const firmware_if::DepthFrame& frame, std::size_t y, unsigned shift,
+                                  const StripSeen& strip, Entry* tile) noexcept;
+  /// Counts what is seen of the strip of tiles from row y on, where this one or one above it has a hole.
   void count_strip(const firmware_if::DepthFrame& frame, std::size_t y, unsigned shift,
-                   const StripSeen& strip, Entry* tile) noexcept;
+                   bool any_lost) noexcept;
   void fill_tiles(const firmware_if::DepthFrame& frame, unsigned shift, Entry* tile) noexcept;
 
   std::size_t max_width_, max_height_;
@@ -99,6 +96,7 @@ class DepthPyramid {
   std::span<Entry> memory_{};
   /// Row y, column x: the pixels seen in the tiles above and to the left. A row and a column more than tiles.
   std::span<std::uint32_t> seen_{};
+  std::array<std::uint8_t, kMaxImageSide> lost_{};  ///< Pixels in holes, of each tile of a strip; at most 64.
   core::PoolRecord* pool_{nullptr};
 };
 

@@ -26,6 +26,7 @@ namespace roborun::bench {
 namespace {
 
 constexpr int kScans = 20;
+constexpr int kCounted = 3;  // scans of --count
 constexpr std::uint16_t kPixels = 128;
 constexpr double kCell_m = kPublishedCell_m;
 
@@ -35,6 +36,7 @@ struct Sensor {
   double range_m;
   double invalid_ratio;
   bool harsh;  ///< See harsh_image(); poses are wrong by 5 cm and 1 degree, one sigma each axis.
+  [[nodiscard]] bool is_perfect() const { return name.rfind("perfect", 0) == 0; }
 };
 
 double cpu_s() {
@@ -110,7 +112,7 @@ class Run {
       spec.model = sensor.model;
       spec.invalid_ratio = sensor.invalid_ratio;
       camera_.push_back(std::make_unique<sitl::SimulatedDepthCamera>(
-          world, spec, camera_mount(spec.mount), sensor.harsh || sensor.name == "perfect" ? none : clean_noise(), 1,
+          world, spec, camera_mount(spec.mount), sensor.harsh || sensor.is_perfect() ? none : clean_noise(), 1,
           static_cast<std::uint32_t>(i)));
     }
   }
@@ -242,11 +244,12 @@ class Run {
 }  // namespace
 }  // namespace roborun::bench
 
-int main() {
+int main(int argc, char** argv) {
   using namespace roborun;
   using namespace roborun::bench;
   const sitl::World world = world_with_poles();
   const std::vector<Sensor> sensors{{"perfect", CameraModel::kClean, 20.0, 0.0, false},
+                                    {"perfect-10", CameraModel::kClean, 10.0, 0.0, false},
                                     {"clean", CameraModel::kClean, 20.0, 0.0, false},
                                     {"clean-10", CameraModel::kClean, 10.0, 0.0, false},
                                     {"harsh", CameraModel::kClean, 20.0, 0.0, true},
@@ -255,7 +258,19 @@ int main() {
                                     {"d455-30", CameraModel::kD455, 10.0, 0.3, false},
                                     {"oak-d", CameraModel::kOakD, 10.0, 0.1, false},
                                     {"tof", CameraModel::kTof, 5.0, 0.1, false}};
-  std::printf("%-8s %5s %9s %10s %5s %9s %14s %9s %9s %8s %14s %8s %8s\n", "sensor", "scans", "free", "false free", "deep", "occupied",
+  if (argc == 3 && std::string(argv[1]) == "--count") {
+    for (const Sensor& sensor : sensors) {
+      if (sensor.name != argv[2]) continue;
+      Run run(world, sensor);
+      for (int n = 0; n < kCounted; ++n) run.scan(n);
+      return 0;
+    }
+  }
+  if (argc != 1) {
+    std::fprintf(stderr, "bench_map_noise: must be called without arguments, or with --count and a sensor of its table\n");
+    return 2;
+  }
+  std::printf("%-10s %5s %9s %10s %5s %9s %14s %9s %9s %8s %14s %8s %8s\n", "sensor", "scans", "free", "false free", "deep", "occupied",
               "false occupied", "surface", "missed", "as free", "poles kept", "refused", "ms");
   std::string json;
   for (const Sensor& sensor : sensors) {
@@ -265,7 +280,7 @@ int main() {
       run.scan(n);
       if (n != 0 && n != 4 && n != 9 && n != kScans - 1) continue;
       const Run::Verdict v = run.judge();
-      std::printf("%-8s %5d %9zu %10zu %5zu %9zu %14zu %9zu %9zu %8zu %7zu of %zu %8u %8.2f\n", sensor.name.c_str(), n + 1, v.free,
+      std::printf("%-10s %5d %9zu %10zu %5zu %9zu %14zu %9zu %9zu %8zu %7zu of %zu %8u %8.2f\n", sensor.name.c_str(), n + 1, v.free,
                   v.false_free, v.deep, v.occupied, v.false_occupied, v.seen, v.missed, v.surface_free, v.pole_kept, v.pole_cells,
                   run.refused(), run.ms());
       std::fflush(stdout);
