@@ -18,6 +18,7 @@
 
 #include "stages/planning/ompl_backend/ompl_space.hpp"
 #include "stages/planning/rrt_star.hpp"
+#include "stages/planning/way_memory.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 #include "toolchain/bench/planner_problems.hpp"
 
@@ -54,7 +55,6 @@ class Deadline {
   std::uint64_t polls_{0};
   bool over_{false};
 };
-
 
 class CpuBudget final : public core::StageBudget {
  public:
@@ -204,12 +204,51 @@ Row summary(const std::string& name, const std::vector<Outcome>& outcomes) {
     allocations += o.allocations;
     solved += o.first_s <= kMost_s ? 1 : 0;
   }
-  const Row row{quantile(first_s, 0.5), quantile(first_s, 0.9), quantile(cost_m, 0.5), quantile(cost_m, 0.9), solved, allocations};
-  fmt::print("{:<16} {:>10.3f} {:>10.3f} {:>10.0f} {:>10.2f} {:>10.2f} {:>8} {:>14.0f}\n", name, 1e3 * row.first_median_s,
-             1e3 * row.first_p90_s, quantile(lookups, 0.5), row.cost_median_m, row.cost_p90_m, solved,
+  const Row row{quantile(first_s, 0.5),
+                quantile(first_s, 0.9),
+                quantile(cost_m, 0.5),
+                quantile(cost_m, 0.9),
+                solved,
+                allocations};
+  fmt::print("{:<16} {:>10.3f} {:>10.3f} {:>10.0f} {:>10.2f} {:>10.2f} {:>8} {:>14.0f}\n", name,
+             1e3 * row.first_median_s, 1e3 * row.first_p90_s, quantile(lookups, 0.5), row.cost_median_m,
+             row.cost_p90_m, solved,
              static_cast<double>(allocations) / static_cast<double>(outcomes.size()) / kAnytime_s);
   std::fflush(stdout);
   return row;
+}
+
+/// What the memory of ways takes of a decision: a look at 24 m around the start, all of it new and then all of it known, and the search for the
+/// ways to the goal through what was seen.
+void print_ways(const std::vector<Problem>& set) {
+  constexpr double kReach_m = 24.0;
+  std::vector<double> new_s, known_s, solve_s;
+  for (const Problem& p : set) {
+    WayMemory::Config config;
+    config.bounds_W = p.request.bounds_W;
+    config.radius_m = config.body_m = kRadius_m;
+    if (!WayMemory::fits(config)) continue;
+    std::vector<std::byte> block(WayMemory::arena_bytes(config));
+    core::Arena arena(block);
+    WayMemory ways(config, arena);
+    core::UnlimitedBudget unlimited;
+    core::Work work;
+    const auto timed = [](std::vector<double>& all_s, auto&& call) {
+      const double begin_s = cpu_s();
+      (void)call();
+      all_s.push_back(cpu_s() - begin_s);
+    };
+    const Vector3& start_W = p.request.start_W;
+    const auto look = [&] { return ways.look(p.view, start_W, kReach_m, unlimited, work); };
+    timed(new_s, look);
+    timed(known_s, look);
+    timed(solve_s, [&] { return ways.solve(start_W, p.request.goal_W, unlimited, work); });
+  }
+  fmt::print(
+      "memory of ways, ms (median, p90): look {:.2f} {:.2f}, look at what is known {:.2f} {:.2f}, search "
+      "{:.2f} {:.2f}\n",
+      1e3 * quantile(new_s, 0.5), 1e3 * quantile(new_s, 0.9), 1e3 * quantile(known_s, 0.5),
+      1e3 * quantile(known_s, 0.9), 1e3 * quantile(solve_s, 0.5), 1e3 * quantile(solve_s, 0.9));
 }
 
 /// Our planner alone, on problems with other numbers than those that are reported: to choose by, and for a profiler.
@@ -224,7 +263,8 @@ int alone(const std::string& kind, std::uint64_t count) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc == 4 && std::strcmp(argv[1], "--alone") == 0) return alone(argv[2], std::strtoull(argv[3], nullptr, 10));
+  if (argc == 4 && std::strcmp(argv[1], "--alone") == 0)
+    return alone(argv[2], std::strtoull(argv[3], nullptr, 10));
   const bool few = argc >= 3 && std::strcmp(argv[1], "--problems") == 0;
   const std::uint64_t most = few ? std::strtoull(argv[2], nullptr, 10) : UINT64_MAX;
   ompl::msg::setLogLevel(ompl::msg::LOG_NONE);
@@ -234,17 +274,20 @@ int main(int argc, char** argv) {
   std::string json;
   for (const bench::Kind& kind : bench::kinds()) {
     std::vector<Problem> set;
-    for (std::uint64_t n = 0; n < std::min(kind.problems, most); ++n) set.push_back(bench::problem_of(kind.name, n));
-    fmt::print("{}: {} problems\n{:<16} {:>10} {:>10} {:>10} {:>10} {:>10} {:>8} {:>14}\n", kind.name, set.size(), "",
-               "first ms", "p90", "boxes", "50 ms: m", "p90", "solved", "allocations/s");
+    for (std::uint64_t n = 0; n < std::min(kind.problems, most); ++n)
+      set.push_back(bench::problem_of(kind.name, n));
+    fmt::print("{}: {} problems\n{:<16} {:>10} {:>10} {:>10} {:>10} {:>10} {:>8} {:>14}\n", kind.name,
+               set.size(), "", "first ms", "p90", "boxes", "50 ms: m", "p90", "solved", "allocations/s");
     std::vector<Outcome> outcomes;
     outcomes.reserve(set.size());
     Own own;
     for (const Problem& p : set) outcomes.push_back(own.run(p));
     const Row ours = summary("roborun", outcomes);
     allocations += ours.allocations;
+    print_ways(set);
     Row best{kInfinity, kInfinity, kInfinity, kInfinity};
-    for (const std::string name : {"RRTstar", "InformedRRTstar", "BITstar", "ABITstar", "AITstar", "RRTConnect"}) {
+    for (const std::string name :
+         {"RRTstar", "InformedRRTstar", "BITstar", "ABITstar", "AITstar", "RRTConnect"}) {
       outcomes.clear();
       for (const Problem& p : set) outcomes.push_back(run_peer(name, p));
       const Row row = summary(name, outcomes);
@@ -253,12 +296,14 @@ int main(int argc, char** argv) {
       best.cost_median_m = std::fmin(best.cost_median_m, row.cost_median_m);
       best.cost_p90_m = std::fmin(best.cost_p90_m, row.cost_p90_m);
     }
-    if (std::isfinite(best.cost_median_m)) cost_median = std::fmax(cost_median, ours.cost_median_m / best.cost_median_m);
+    if (std::isfinite(best.cost_median_m))
+      cost_median = std::fmax(cost_median, ours.cost_median_m / best.cost_median_m);
     if (std::isfinite(best.cost_p90_m)) cost_p90 = std::fmax(cost_p90, ours.cost_p90_m / best.cost_p90_m);
-    json += fmt::format(R"("{}":{{"solved":{},"best_peer_solved":{},"first_vs_best_peer":{:.3f}}},)", kind.name, ours.solved,
-                        best.solved, ours.first_median_s / best.first_median_s);
+    json += fmt::format(R"("{}":{{"solved":{},"best_peer_solved":{},"first_vs_best_peer":{:.3f}}},)",
+                        kind.name, ours.solved, best.solved, ours.first_median_s / best.first_median_s);
   }
-  fmt::print(R"({{{}"cost_50ms_vs_best_median":{:.4f},"cost_50ms_vs_best_p90":{:.4f},"allocations":{}}})" "\n", json,
-             cost_median, cost_p90, allocations);
+  fmt::print(R"({{{}"cost_50ms_vs_best_median":{:.4f},"cost_50ms_vs_best_p90":{:.4f},"allocations":{}}})"
+             "\n",
+             json, cost_median, cost_p90, allocations);
   return 0;
 }
