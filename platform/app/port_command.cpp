@@ -37,11 +37,6 @@ MonotonicTime monotonic_now() {
   return MonotonicTime{std::chrono::steady_clock::monotonic_now().time_since_epoch()};
 }
 
-/// A name stands for a file of kPortFolder; what has a slash is a file.
-std::string port_path(const std::string& name) {
-  return name.find('/') == std::string::npos ? fmt::format("{}/{}{}", kPortFolder, kPortPrefix, name) : name;
-}
-
 /// A writer holds the file's lock as long as it lives.
 bool is_written_to(const std::string& path) {
   const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -299,6 +294,10 @@ int check_ports(const std::vector<std::string>& names, double duration_s, bool j
 }
 
 }  // namespace
+
+std::string port_path(const std::string& name) {
+  return name.find('/') == std::string::npos ? fmt::format("{}/{}{}", kPortFolder, kPortPrefix, name) : name;
+}
 
 void add_port_command(CLI::App& app, std::function<int()>& run) {
   struct PortOptions {
