@@ -22,11 +22,13 @@
 #include "platform/app/config_command.hpp"
 #include "platform/app/exit_code.hpp"
 #include "platform/app/explain_command.hpp"
+#include "platform/app/feed_command.hpp"
 #include "platform/app/fly_command.hpp"
 #include "platform/app/gpio_command.hpp"
 #include "platform/app/map_command.hpp"
 #include "platform/app/memory_command.hpp"
 #include "platform/app/options.hpp"
+#include "platform/app/port_command.hpp"
 #include "platform/app/replay_command.hpp"
 #include "platform/app/scenario_command.hpp"
 #include "platform/app/solve_command.hpp"
@@ -88,6 +90,8 @@ int run_command(int argc, char** argv) {
   cli::add_map_command(app, run);
   cli::add_can_command(app, run);
   cli::add_gpio_command(app, run);
+  cli::add_port_command(app, run);
+  cli::add_feed_command(app, run);
   cli::add_sweep_command(app, run);
   cli::add_scenario_command(app, run);
   cli::add_replay_command(app, run);

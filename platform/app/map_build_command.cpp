@@ -11,8 +11,8 @@
 #include "core/sensor_model.hpp"
 #include "platform/app/exit_code.hpp"
 #include "platform/app/options.hpp"
+#include "platform/app/recording_arguments.hpp"
 #include "platform/dataset/map_build.hpp"
-#include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/output_file.hpp"
 #include "platform/input/stop_signal.hpp"
@@ -23,14 +23,14 @@ namespace roborun::app {
 namespace {
 
 struct BuildOptions {
-  std::string from, intrinsics, scale, model{"d455"}, output;
-  double precision_m{0.3}, range_m{10.0};
+  RecordingArguments recording;
+  std::string model{"d455"}, output;
+  double precision_m{0.3};
   bool json{false};
 };
 
-dataset::RecordingOptions recording_options(const BuildOptions& options) {
-  dataset::RecordingOptions recording;
-  recording.range_m = options.range_m;
+dataset::RecordingOptions build_options(const BuildOptions& options) {
+  dataset::RecordingOptions recording = recording_options(options.recording);
   const auto model = model_of<CameraModel>(options.model);
   if (!model)
     throw InputError(
@@ -38,15 +38,6 @@ dataset::RecordingOptions recording_options(const BuildOptions& options) {
   recording.error = depth_error(*model);
   // Where the poses say is where the camera was: what is wrong with them is not known.
   recording.error.place_m = recording.error.angle_rad = 0.0;
-  if (options.intrinsics.empty() != options.scale.empty())
-    throw InputError("--intrinsics, --depth-scale: must be given both or none");
-  if (options.intrinsics.empty()) return recording;
-  const std::vector<std::string> part = input::split(options.intrinsics);
-  if (part.size() != 4)
-    throw InputError(fmt::format("--intrinsics: '{}': must be FX,FY,CX,CY in pixels", options.intrinsics));
-  const auto pixels = [&](std::size_t i) { return input::number_of("--intrinsics", part[i], 1.0, 10000.0); };
-  recording.optics = {pixels(0), pixels(1), pixels(2), pixels(3),
-                      input::number_of("--depth-scale", options.scale, 1.0, 1e6)};
   return recording;
 }
 
@@ -81,9 +72,9 @@ void tell(const BuildOptions& options, const dataset::MapBuild& build) {
 }
 
 int build(const BuildOptions& options) {
-  const dataset::RecordingOptions how = recording_options(options);
+  const dataset::RecordingOptions how = build_options(options);
   const bool full = !options.output.empty() && sitl::is_full_octomap(options.output);
-  dataset::Recording recording(options.from, how);
+  dataset::Recording recording(options.recording.from, how);
   input::check_outputs({{"--output", options.output}}, {});
   const input::StopOnSignal stop;
   dataset::MapBuild made;
@@ -110,7 +101,7 @@ int build(const BuildOptions& options) {
                made.bricks_given_up);
   if (!options.output.empty()) {
     if (made.leaves.leaves.empty())
-      throw InputError(fmt::format("{}: nothing is known: no map to be written", options.from));
+      throw InputError(fmt::format("{}: nothing is known: no map to be written", options.recording.from));
     input::write_file(options.output, sitl::write_octomap(made.leaves, full));
   }
   tell(options, made);
@@ -157,11 +148,8 @@ void add_map_build_command(CLI::App& map, std::function<int()>& run) {
       "--depth-scale 5000 --range 4 -o desk.bt\n"
       "  roborun map build --from street --range 60 --json\n\n"
       "Exit code: 0 done, 2 bad input, 130 interrupted.");
-  command->add_option("--from", options->from, "a folder")->required();
+  add_recording_arguments(*command, options->recording);
   add_number(*command, "--precision", options->precision_m, 0.05, 0.3, "edge of the finest cells, metres");
-  add_number(*command, "--range", options->range_m, 0.5, 300.0, "what is farther is not looked at, metres");
-  command->add_option("--intrinsics", options->intrinsics, "FX,FY,CX,CY in pixels, instead of camera.txt");
-  command->add_option("--depth-scale", options->scale, "values of an image per metre, such as 1000 or 5000");
   command
       ->add_option("--model", options->model,
                    fmt::format("whose errors the images have: {}", fmt::join(kCameraModels, ", ")))

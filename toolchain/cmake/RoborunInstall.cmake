@@ -22,7 +22,8 @@ endforeach()
 # Of platform only what a component holds.
 set(_headers firmware_if core governor stages platform)
 foreach(_folder IN LISTS _headers)
-  file(GLOB_RECURSE _files CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/${_folder}/*.hpp)
+  file(GLOB_RECURSE _files CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/${_folder}/*.hpp
+       ${PROJECT_SOURCE_DIR}/${_folder}/*.h)
   list(FILTER _files EXCLUDE REGEX "/example/|^platform/(app|evaluation)/")
   if(NOT ROBORUN_SIMULATOR)
     list(FILTER _files EXCLUDE REGEX "_backend/|^platform/[^f]")

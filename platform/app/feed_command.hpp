@@ -1,0 +1,11 @@
+/// `roborun feed`: processes that write to sensor ports.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+namespace roborun::app {
+
+void add_feed_command(CLI::App& app, std::function<int()>& run);
+
+}  // namespace roborun::app

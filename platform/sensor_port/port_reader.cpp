@@ -1,0 +1,164 @@
+#include "platform/sensor_port/port_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <cstring>
+
+namespace roborun::sensor_port {
+namespace {
+
+// A file that processes of both sides map: the layout is the interface.
+static_assert(sizeof(roborun_port_header) == 128 && sizeof(roborun_port_slot) == 16);
+static_assert(sizeof(roborun_port_depth) == 96 && sizeof(roborun_port_cloud) == 64);
+static_assert(sizeof(roborun_port_odometry) == 144 && sizeof(roborun_port_imu) == 64);
+static_assert(sizeof(roborun_port_gnss) == 88 && sizeof(roborun_port_range) == 64);
+
+template <typename T>
+T load(const T& shared, int order) noexcept {
+  return order == __ATOMIC_ACQUIRE ? __atomic_load_n(&shared, __ATOMIC_ACQUIRE)
+                                   : __atomic_load_n(&shared, __ATOMIC_RELAXED);
+}
+
+}  // namespace
+
+const char* kind_name(std::uint32_t kind) noexcept {
+  switch (kind) {
+    case ROBORUN_PORT_DEPTH:
+      return "depth";
+    case ROBORUN_PORT_CLOUD:
+      return "cloud";
+    case ROBORUN_PORT_ODOMETRY:
+      return "odometry";
+    case ROBORUN_PORT_IMU:
+      return "imu";
+    case ROBORUN_PORT_GNSS:
+      return "gnss";
+    case ROBORUN_PORT_RANGE:
+      return "range";
+    default:
+      return "unknown";
+  }
+}
+
+std::string PortReader::check_layout() {
+  if (memory_.size() < sizeof(roborun_port_header)) return "is no sensor port: shorter than its header";
+  roborun_port_header h;  // what is checked is what is used
+  std::memcpy(&h, memory_.data(), sizeof h);
+  if (std::memcmp(h.magic, ROBORUN_PORT_MAGIC, sizeof h.magic) != 0)
+    return "is no sensor port: must begin with " ROBORUN_PORT_MAGIC;
+  if (h.version != ROBORUN_PORT_VERSION)
+    return fmt::format("is of port version {}: must be {}", h.version, ROBORUN_PORT_VERSION);
+  const std::uint32_t sample_bytes = roborun_port_sample_bytes(h.kind);
+  if (sample_bytes == 0) return fmt::format("holds samples of kind {}: must be 1 to 6", h.kind);
+  if (kind_ != 0 && h.kind != kind_)
+    return fmt::format("holds {} samples: must be {}", kind_name(h.kind), kind_name(kind_));
+  if (h.sample_bytes != sample_bytes)
+    return fmt::format("its {} samples have {} bytes: must be {}", kind_name(h.kind), h.sample_bytes,
+                       sample_bytes);
+  if (h.slot_count < 2 || h.slot_count > ROBORUN_PORT_MOST_SLOTS)
+    return fmt::format("has {} slots: must be 2 to {}", h.slot_count, ROBORUN_PORT_MOST_SLOTS);
+  if (h.slot_bytes % 64 != 0 || h.slot_bytes < sizeof(roborun_port_slot) + sample_bytes ||
+      h.slot_bytes > ROBORUN_PORT_MOST_BYTES)
+    return fmt::format("has slots of {} bytes: must be a multiple of 64 from {} to {}", h.slot_bytes,
+                       sizeof(roborun_port_slot) + sample_bytes, ROBORUN_PORT_MOST_BYTES);
+  if (memory_.size() != roborun_port_file_bytes(h.slot_count, h.slot_bytes))
+    return fmt::format("has {} bytes: must be {}", memory_.size(),
+                       roborun_port_file_bytes(h.slot_count, h.slot_bytes));
+  kind_ = h.kind;
+  slot_count_ = h.slot_count;
+  slot_bytes_ = h.slot_bytes;
+  sample_bytes_ = sample_bytes;
+  writer_ = h.writer;
+  next_ = h.written;
+  return {};
+}
+
+std::string PortReader::open(const std::string& path, std::uint32_t kind) {
+  path_ = path;
+  kind_ = kind;
+  std::string wrong = memory_.open(path);
+  if (wrong.empty()) wrong = check_layout();
+  if (wrong.empty()) {
+    copy_.assign((slot_bytes_ - sizeof(roborun_port_slot)) / 8, 0);
+  } else {
+    memory_.close();
+  }
+  return wrong;
+}
+
+bool PortReader::look(std::uint64_t& written) noexcept {
+  const std::uint64_t writer = load(header().writer, __ATOMIC_ACQUIRE);
+  if (writer != writer_) ++counters_.restarts;
+  writer_ = writer;
+  written = load(header().written, __ATOMIC_ACQUIRE);
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 62U;  // twice that is a guard
+  if (written < next_ || written > kMost) {                 // no writer that keeps the rules does that
+    ++counters_.refused;
+    next_ = written <= kMost ? written : next_;
+    return false;
+  }
+  return written > next_;
+}
+
+bool PortReader::copy(std::uint64_t n, PortSample& out) noexcept {
+  const std::byte* at = memory_.data() + sizeof(roborun_port_header) + (n % slot_count_) * slot_bytes_;
+  const auto& slot = *reinterpret_cast<const roborun_port_slot*>(at);
+  if (load(slot.guard, __ATOMIC_ACQUIRE) != 2 * n + 2) return false;
+  const std::uint32_t bytes = load(slot.payload_bytes, __ATOMIC_RELAXED);
+  const std::uint32_t room = payload_room_bytes();
+  const std::uint32_t taken = bytes <= room ? bytes : 0;
+  const auto* word = reinterpret_cast<const std::uint64_t*>(at + sizeof slot);
+  const std::size_t words = (sample_bytes_ + taken + 7) / 8;
+  for (std::size_t i = 0; i < words; ++i) copy_[i] = load(word[i], __ATOMIC_RELAXED);
+  const std::int64_t offset_ns = load(header().clock_offset_ns, __ATOMIC_RELAXED);
+  // What was read above was read before the guard is looked at again.
+  std::atomic_thread_fence(std::memory_order_acquire);
+  if (load(slot.guard, __ATOMIC_RELAXED) != 2 * n + 2) return false;
+  const auto* whole = reinterpret_cast<const std::byte*>(copy_.data());
+  out = {{whole, sample_bytes_}, {whole + sample_bytes_, taken}, offset_ns};
+  if (bytes > room) {
+    ++counters_.refused;
+    out.payload = {};
+  }
+  return true;
+}
+
+Status PortReader::newest(PortSample& out) noexcept {
+  if (memory_.data() == nullptr || memory_.is_cut()) return Status::kIo;
+  for (int i = 0; i < kTries; ++i) {
+    std::uint64_t written = 0;
+    if (!look(written)) return memory_.is_cut() ? Status::kIo : Status::kNotReady;
+    if (copy(written - 1, out)) {
+      counters_.dropped += written - 1 - next_;
+      next_ = written;
+      ++counters_.read;
+      return memory_.is_cut() ? Status::kIo : Status::kOk;
+    }
+    ++counters_.torn;
+  }
+  return memory_.is_cut() ? Status::kIo : Status::kNotReady;
+}
+
+Status PortReader::next(PortSample& out) noexcept {
+  if (memory_.data() == nullptr || memory_.is_cut()) return Status::kIo;
+  for (int i = 0; i < kTries; ++i) {
+    std::uint64_t written = 0;
+    if (!look(written)) return memory_.is_cut() ? Status::kIo : Status::kNotReady;
+    // The slot of the one before these is the next that is written.
+    const std::uint64_t oldest = written >= slot_count_ ? written - slot_count_ + 1 : 0;
+    if (next_ < oldest) {
+      counters_.dropped += oldest - next_;
+      next_ = oldest;
+    }
+    if (copy(next_, out)) {
+      ++next_;
+      ++counters_.read;
+      return memory_.is_cut() ? Status::kIo : Status::kOk;
+    }
+    ++counters_.torn;
+  }
+  return memory_.is_cut() ? Status::kIo : Status::kNotReady;
+}
+
+}  // namespace roborun::sensor_port

@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# roborun port, with the Python example as the feeder. usage: port_cli_test.sh ROBORUN ROOT
+set -uo pipefail
+roborun=$1 root=$2
+name=test-$$ path=/dev/shm/roborun-test-$$
+failed=0 passed=0
+feeder=
+trap 'kill $feeder 2>/dev/null; rm -f "$path"*' EXIT
+says() {  # CODE TEXT COMMAND..
+  local wanted=$1 text=$2 out code
+  shift 2
+  out=$("$roborun" "$@" 2>&1)
+  code=$?
+  if [[ $code -ne $wanted || "$out" != *"$text"* ]]; then
+    echo "FAILED [$code] roborun $*: '${out:0:300}' does not say '$text' with exit code $wanted"
+    failed=$((failed + 1))
+  else
+    passed=$((passed + 1))
+  fi
+}
+says 2 "No such file or directory" port check "$name"
+says 2 "is no sensor port" port watch "$root/README.md" --seconds 1
+"$root/platform/sensor_port/example/feed_wall.py" "$name" &
+feeder=$!
+for _ in $(seq 100); do [[ -e $path ]] && break; sleep 0.05; done
+says 0 "READY     $name: " port check "$name"
+says 0 "160 x 120, 90 x 74 degrees, 100 % of the pixels know something" port check "$path"
+says 0 '"ready":true' port check "$name" --json
+says 0 "written to" port list
+says 0 "nearest 5.00 m; 0 missed" port watch "$name" --seconds 0.5
+kill -9 $feeder
+wait $feeder 2>/dev/null
+says 1 "NOT READY $name: no process writes to it: start its feeder" port check "$name" --seconds 0.2
+says 0 "no writer" port list
+says 0 '"written_to":false' port list --json
+truncate -s 100 "$path"
+says 2 "shorter than its header" port check "$name"
+# The header alone is enough for C99.
+printf '#include "platform/sensor_port/roborun_port.h"\nint main(void) { struct roborun_port_writer w; struct roborun_port_imu s; memset(&s, 0, sizeof s);\nconst char* e = roborun_port_open(&w, "%s", ROBORUN_PORT_IMU, 0, 8); if (e) { puts(e); return 1; }\nfor (;;) { struct timespec t; clock_gettime(CLOCK_MONOTONIC, &t); s.at.stamp_ns = t.tv_sec * 1000000000LL + t.tv_nsec; s.at.sequence++; roborun_port_write(&w, &s, NULL, 0); usleep(2500); } }\n' "$path" >"$path.c"
+if cc -std=c99 -D_DEFAULT_SOURCE -Wall -Wextra -Werror -pedantic -O2 -I"$root" "$path.c" -o "$path.feeder"; then
+  "$path.feeder" &
+  feeder=$!
+  sleep 0.3
+  says 0 "READY     $name: " port check "$name"
+  says 0 '"device":"imu"' port list --json
+else
+  echo "FAILED roborun_port.h is no C99"
+  failed=$((failed + 1))
+fi
+echo "$passed passed, $failed failed"
+[[ $failed -eq 0 && $passed -ge 13 ]]
