@@ -114,9 +114,14 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), need, budget, work);
   motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W}, cloud_.points(), map_.view(), budget, work);
   out.motion = motion_.moving(in.now);
-  (void)profile_space(profiler, cloud_.points(), map_.view(), *in.committed, in.now, in.p_WB, in.v_WB,
-                      in.goal_W, relevant_W, is_narrow_ ? slow_radius_m(config_.vehicle) : r_m, out.profile,
-                      budget, work);
+  // Where views leave gaps a coarse cell is rarely seen whole: in such cells nothing were visible, the governor would hurry,
+  // choose coarser ones, and see as little again.
+  const stages::FinestView finest(map_.view());
+  const stages::MapView& seen =
+      config_.sees_all_around ? map_.view() : static_cast<const stages::MapView&>(finest);
+  (void)profile_space(profiler, cloud_.points(), seen, *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W,
+                      relevant_W, is_narrow_ ? slow_radius_m(config_.vehicle) : r_m, out.profile, budget,
+                      work);
   out.profile.sensor_volume_m3 = cloud_.seen_volume_m3();
   // What the map will hold once this decision's images are in it.
   out.profile.map_volume_m3 = map_.known_volume_m3() + cloud_.seen_volume_m3();
