@@ -15,8 +15,7 @@ constexpr double kVisitedCell_m = 4.8;
 constexpr double kVisitedCell_m3 = kVisitedCell_m * kVisitedCell_m * kVisitedCell_m;
 constexpr double kGoalBias = 0.15;
 constexpr std::uint64_t kSpare = 4096;  // lookups that are granted whatever the budget says
-constexpr double kKnownReach_m = 15.0;
-constexpr double kLookAhead_m = 12.0;  // beyond a path's end
+constexpr double kLookAhead_m = 12.0;   // beyond a path's end
 // What a surface right ahead of a path's end costs: the way around a pillar.
 constexpr double kDetour_m = 10.0;
 
@@ -299,39 +298,6 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
   }
   // 3. As near to the goal as known free space reaches.
   return explore(s, map, goal_bad, best, result);
-}
-
-bool RrtStar::follow_ways(Search& s, const MapView& map, double below_m, PlanResult& result) noexcept {
-  std::array<Vector3, kMaxWaypoints> way_W;
-  // What is known may be farther away than sensors reach.
-  const double reach_m = std::fmax(s.request.horizon_m, kKnownReach_m);
-  const std::size_t count = s.request.ways->known_way(s.request.start_W, reach_m - 1.0, way_W);
-  // Where no path leads to, none leads to what lies behind: half of the rest is tried next.
-  for (std::size_t next = count; next > 0;) {
-    const std::size_t i = --next;
-    const double rest_m = kUnknownWeight * s.request.ways->to_goal_m(way_W[i]);
-    if ((way_W[i] - s.request.start_W).norm() < 1.0 ||
-        !((way_W[i] - s.request.start_W).norm() + rest_m < below_m))
-      continue;
-    PlanRequest request = s.request;
-    request.goal_W = way_W[i];
-    request.horizon_m = reach_m;
-    if (!map.is_free(Aabb::around(request.goal_W, request.radius_m), s.work.units)) continue;
-    Search to_it{request, s.view, s.budget, s.work, s.rng};
-    clear(to_it);
-    PlanResult found;
-    found.work = {};
-    (void)connect(to_it, found);
-    if (found.path_W.size() < 2) {
-      next /= 2;
-      continue;
-    }
-    if (!(found.cost_m + rest_m < below_m)) continue;
-    result.path_W = found.path_W;
-    result.cost_m = found.cost_m;
-    return true;
-  }
-  return false;
 }
 
 Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32_t best,

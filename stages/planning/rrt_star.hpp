@@ -112,6 +112,8 @@ class RrtStar final : public Planner {
   // The goal is known free space.
   [[nodiscard]] Status connect(Search& s, PlanResult& result) noexcept;
   [[nodiscard]] bool find_first(Search& s) noexcept;
+  /// Of the first solution the answer.
+  [[nodiscard]] Status tighten(Search& s, PlanResult& result) noexcept;
   /// Informed RRT*: grows the tree where it can still hold a path shorter than `best_W`, of length best_m, and
   /// pulls what it finds tight. kOk or kBudgetSpent.
   [[nodiscard]] Status improve(Search& s, double best_m, Path& best_W) noexcept;
@@ -133,6 +135,9 @@ class RrtStar final : public Planner {
   /// `map`: what s.view polls for.
   /// To where the ways that are known lead on: a path of at most `below_m` with its rest, as a whole.
   [[nodiscard]] bool follow_ways(Search& s, const MapView& map, double below_m, PlanResult& result) noexcept;
+  /// From the start along the corners of a known way, as far as it goes: straight where that is free, by short searches
+  /// elsewhere. At most kChained of them.
+  [[nodiscard]] Path chain(Search& s, std::span<const Vector3> way_W) noexcept;
   [[nodiscard]] Status explore(Search& s, const MapView& map, bool goal_bad, std::int32_t best,
                                PlanResult& result) noexcept;
   [[nodiscard]] Vector3 sample(Search& s) const noexcept;

@@ -203,10 +203,15 @@ bool RrtStar::find_on_lattice(Search& s) noexcept {
 }
 
 Status RrtStar::connect(Search& s, PlanResult& result) noexcept {
+  if (find_first(s) || find_on_lattice(s)) return tighten(s, result);
+  clear(s);
+  return Status::kNoPath;
+}
+
+Status RrtStar::tighten(Search& s, PlanResult& result) noexcept {
   const PlanRequest& request = s.request;
-  const bool found = find_first(s) || find_on_lattice(s);
   Path best_W;
-  if (!found || !path_to(goal_, best_W)) {
+  if (!path_to(goal_, best_W)) {
     clear(s);
     return Status::kNoPath;
   }
