@@ -25,6 +25,7 @@
 #include "platform/app/fly_command.hpp"
 #include "platform/app/gpio_command.hpp"
 #include "platform/app/map_command.hpp"
+#include "platform/app/mavlink_command.hpp"
 #include "platform/app/memory_command.hpp"
 #include "platform/app/options.hpp"
 #include "platform/app/replay_command.hpp"
@@ -88,6 +89,7 @@ int run_command(int argc, char** argv) {
   cli::add_map_command(app, run);
   cli::add_can_command(app, run);
   cli::add_gpio_command(app, run);
+  cli::add_mavlink_command(app, run);
   cli::add_sweep_command(app, run);
   cli::add_scenario_command(app, run);
   cli::add_replay_command(app, run);
