@@ -14,12 +14,12 @@
 
 #include "firmware_if/dronecan/node.hpp"
 #include "platform/app/exit_code.hpp"
+#include "platform/app/input_lines.hpp"
 #include "platform/app/options.hpp"
 #include "platform/can/candump.hpp"
 #include "platform/can/message_json.hpp"
 #include "platform/can/socket_can.hpp"
 #include "platform/input/input_error.hpp"
-#include "platform/input/input_file.hpp"
 #include "platform/input/json_reader.hpp"
 #include "platform/input/stop_signal.hpp"
 
@@ -28,16 +28,6 @@ namespace {
 
 namespace dc = firmware_if::dronecan;
 using Json = nlohmann::ordered_json;
-
-/// Calls visit(line, number) for each line of a file, or of standard input if `path` is empty or "-".
-template <typename Visit>
-void for_each_line(const std::string& path, const char* wanted, Visit&& visit) {
-  constexpr std::size_t kMostLine_bytes = 1U << 16U;
-  input::InputFile file =
-      path.empty() || path == "-" ? input::InputFile::standard_input() : input::InputFile(path, wanted);
-  std::string line;
-  for (std::size_t number = 1; file.line(line, kMostLine_bytes); ++number) visit(line, number);
-}
 
 const char* kind_name(dc::TransferKind kind) {
   if (kind == dc::TransferKind::kMessage) return "message";

@@ -26,6 +26,7 @@
 #include "platform/app/fly_command.hpp"
 #include "platform/app/gpio_command.hpp"
 #include "platform/app/map_command.hpp"
+#include "platform/app/mavlink_command.hpp"
 #include "platform/app/memory_command.hpp"
 #include "platform/app/options.hpp"
 #include "platform/app/port_command.hpp"
@@ -92,6 +93,7 @@ int run_command(int argc, char** argv) {
   cli::add_gpio_command(app, run);
   cli::add_port_command(app, run);
   cli::add_feed_command(app, run);
+  cli::add_mavlink_command(app, run);
   cli::add_sweep_command(app, run);
   cli::add_scenario_command(app, run);
   cli::add_replay_command(app, run);

@@ -7,6 +7,8 @@
 #include <set>
 #include <string_view>
 
+#include "platform/input/byte_text.hpp"
+
 namespace roborun::can {
 namespace {
 
@@ -52,19 +54,6 @@ concept IsText = IsArray<Wire> &&(std::is_same_v<Wire, dc::Dynamic<dc::Uint<8>, 
 
 // ---- out
 
-std::string text_of(std::span<const std::uint8_t> bytes) {
-  std::string text;
-  for (const std::uint8_t byte : bytes) {
-    if (byte < 0x80) {
-      text += static_cast<char>(byte);
-    } else {
-      text += static_cast<char>(0xc0U | (byte >> 6U));
-      text += static_cast<char>(0x80U | (byte & 0x3fU));
-    }
-  }
-  return text;
-}
-
 template <typename T>
 void add_fields(Json& out, const T& message, const std::string& prefix = {});
 
@@ -88,7 +77,7 @@ template <IsArray Wire>
 Json value_of(const typename Wire::Value& value) {
   using Item = typename Shape<Wire>::ItemType;
   if constexpr (IsText<Wire>) {
-    return text_of(value.view());
+    return input::text_of_bytes(value.view());
   } else {
     Json out = Json::array();
     if constexpr (Shape<Wire>::kFixed) {
@@ -169,15 +158,9 @@ void read_value(const Json& in, typename Wire::Value& value, const std::string& 
   using Item = typename Shape<Wire>::ItemType;
   if constexpr (IsText<Wire>) {
     if (!in.is_string()) refuse(name, in, "a text");
-    const auto text = in.get<std::string>();
-    for (std::size_t i = 0; i < text.size(); ++i) {
-      auto byte = static_cast<std::uint8_t>(text[i]);
-      if (byte >= 0x80) {
-        const bool two = (byte == 0xc2 || byte == 0xc3) && i + 1 < text.size();
-        if (!two) refuse(name, in, "a text of code points below U+0100");
-        byte = static_cast<std::uint8_t>((unsigned{byte} << 6U) |
-                                         (static_cast<unsigned char>(text[++i]) & 0x3fU));
-      }
+    const auto bytes = input::bytes_of_text(in.get<std::string>());
+    if (!bytes) refuse(name, in, "a text of code points below U+0100");
+    for (const std::uint8_t byte : *bytes) {
       if (!value.push_back(byte)) refuse(name, in, fmt::format("at most {} bytes", value.items.size()));
     }
   } else {

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "stages/planning/rrt_star.hpp"
-#include "stages/planning/way_memory.hpp"
+#include "stages/planning/ways.hpp"
 
 namespace roborun::stages {
 namespace {
