@@ -40,7 +40,8 @@ inline constexpr std::size_t kEventCount = 10;
 /// With a verifier: only signed, right and new frames are kFrame. Without: signed ones are as good as
 /// unsigned ones, and `is_authenticated` is false for all.
 /// RT-safe: no allocation; push() is O(bytes), next() O(one frame), and the calls that give an event are at
-/// most as many as bytes were pushed. One thread.
+/// most as many as bytes were pushed. A hostile sender can make every byte a start byte whose checksum has to
+/// be computed: a lane bounds its calls of next() per cycle, and what is left waits. One thread.
 class Receiver {
  public:
   struct Counters {
