@@ -5,10 +5,11 @@
 namespace roborun::firmware_if::mavlink {
 
 const char* to_string(Event event) noexcept {
-  constexpr std::array<const char*, kEventCount> kNames{
-      "nothing",          "frame",     "unknown id", "unknown incompatibility flag",
-      "wrong checksum",   "cut short", "not signed", "wrong signature",
-      "signature not new"};
+  constexpr std::array<const char*, kEventCount> kNames{"nothing",           "frame",
+                                                        "unknown id",        "unknown incompatibility flag",
+                                                        "wrong checksum",    "cut short",
+                                                        "not signed",        "wrong signature",
+                                                        "signature not new", "no room for its sender"};
   return kNames[static_cast<std::size_t>(event)];
 }
 
@@ -80,8 +81,9 @@ Event Receiver::judge(Frame& frame) noexcept {
       return Event::kBadSignature;
     case SignatureVerdict::kReplayed:
     case SignatureVerdict::kTooOld:
-    case SignatureVerdict::kNoRoom:
       return Event::kReplayed;
+    case SignatureVerdict::kNoRoom:
+      return Event::kNoRoom;
   }
   return Event::kBadSignature;
 }

@@ -23,8 +23,9 @@ enum class Event : std::uint8_t {
   kUnsigned,      ///< Whole, but a signature is demanded.
   kBadSignature,  ///< Whole, but not signed with our key.
   kReplayed,      ///< Signed with our key, but not new.
+  kNoRoom,        ///< Signed with our key, but one sender too many for the verifier.
 };
-inline constexpr std::size_t kEventCount = 9;
+inline constexpr std::size_t kEventCount = 10;
 [[nodiscard]] const char* to_string(Event event) noexcept;
 
 /// Both versions mixed. After a failed start byte the search goes on right behind it, so that a damaged frame
@@ -39,7 +40,8 @@ inline constexpr std::size_t kEventCount = 9;
 /// With a verifier: only signed, right and new frames are kFrame. Without: signed ones are as good as
 /// unsigned ones, and `is_authenticated` is false for all.
 /// RT-safe: no allocation; push() is O(bytes), next() O(one frame), and the calls that give an event are at
-/// most as many as bytes were pushed. One thread.
+/// most as many as bytes were pushed. A hostile sender can make every byte a start byte whose checksum has to
+/// be computed: a lane bounds its calls of next() per cycle, and what is left waits. One thread.
 class Receiver {
  public:
   struct Counters {
@@ -54,7 +56,7 @@ class Receiver {
   /// given kNothing. What was given out of frames is no longer valid.
   [[nodiscard]] std::size_t push(std::span<const std::uint8_t> bytes) noexcept;
   /// `frame` is written with kFrame, and with events of whole frames (kUnknownId, kUnsigned, kBadSignature,
-  /// kReplayed) for the log; valid until the next push().
+  /// kReplayed, kNoRoom) for the log; valid until the next push().
   [[nodiscard]] Event next(Frame& frame) noexcept;
   /// What is pending will never be completed: its start byte was false, and there may be frames behind it.
   /// For the end of a file, and for a line that was silent for longer than a frame takes. Until push().

@@ -70,11 +70,13 @@ void summarise(const mav::Receiver::Counters& counters, const std::map<std::uint
     ids += fmt::format("{}{} x{}", ids.empty() ? ": " : ", ", id, times);
   fmt::print(stderr,
              "roborun mavlink decode: {} messages, {} of unknown ids{}, {} with a wrong checksum, {} with "
-             "unknown flags, {} cut short, {} not signed, {} wrongly signed, {} signed but not new, {} bytes "
-             "outside of frames\n",
+             "unknown flags, {} cut short, {} not signed, {} wrongly signed, {} signed but not new, {} "
+             "signed by one "
+             "sender too many, {} bytes outside of frames\n",
              count(Event::kFrame), count(Event::kUnknownId), ids, count(Event::kBadCrc),
              count(Event::kBadFlags), count(Event::kCut), count(Event::kUnsigned),
-             count(Event::kBadSignature), count(Event::kReplayed), counters.garbage_bytes);
+             count(Event::kBadSignature), count(Event::kReplayed), count(Event::kNoRoom),
+             counters.garbage_bytes);
 }
 
 int decode(const DecodeOptions& options) {

@@ -106,9 +106,8 @@ class Model {
     for (std::size_t i = 6; i > 0; --i) stamp = 256 * stamp + block[i];
     const auto key = std::tuple(b[5], b[6], block[0]);
     const auto known = last_.find(key);
-    if (known != last_.end() ? stamp <= known->second
-                             : stamp + 6'000'000 < clock_ || last_.size() == kStreams)
-      return Event::kReplayed;
+    if (known != last_.end() ? stamp <= known->second : stamp + 6'000'000 < clock_) return Event::kReplayed;
+    if (known == last_.end() && last_.size() == kStreams) return Event::kNoRoom;
     last_[key] = stamp;
     clock_ = std::max(clock_, stamp);
     return Event::kFrame;
@@ -256,9 +255,9 @@ TEST(MavlinkHostile, WithoutKeyIsReadAsTheModelReadsIt) {
 TEST(MavlinkHostile, WithKeyNothingUnsignedForgedOrOldIsTaken) {
   auto counts = compare(24, 500'000, true);
   for (const Event event : {Event::kFrame, Event::kUnknownId, Event::kBadCrc, Event::kBadFlags,
-                            Event::kUnsigned, Event::kBadSignature, Event::kReplayed})
+                            Event::kUnsigned, Event::kBadSignature, Event::kReplayed, Event::kNoRoom})
     EXPECT_GT(counts[event], 5'000U) << to_string(event);
-  EXPECT_EQ(counts.size(), 7U);
+  EXPECT_EQ(counts.size(), 8U);
 }
 
 TEST(MavlinkHostile, PureNoiseGivesNoFrame) {
