@@ -88,6 +88,10 @@ governor::GovernorConfig governor_config(const FlightConfig& config) noexcept {
   g.sensor_volume_max_m3 = 4.0 * range_m * range_m * std::min(height_m, 2.0 * range_m);
   g.lattice = lattice_of(config);
   g.coarsest_level = lattice_of(config).coarsest_level_within(config.bounds_W.size().z() / 3.0);
+  // A look at a whole block of the map writes no surfaces inside it, and what is in front of them stays unknown.
+  if (g.lattice.finest_m < kPublishedCell_m)
+    g.coarsest_level = std::min(g.coarsest_level,
+                                g.lattice.coarsest_level_within(0.5 * stages::block_m(g.lattice.finest_m)));
   g.minor_frame = config.minor_frame;
   return g;
 }

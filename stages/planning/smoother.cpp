@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kAtRest = 0.05;  // m/s and m/s2
 constexpr double kSameWaypoint_m = 0.25;
+constexpr double kLeastPiece_m = 0.03;
 constexpr double kMinSegment_s = 0.15;
 constexpr double kCruisePiece_m = 5.0;
 // Of the acceleration limit: the curve around the profile needs the rest.
@@ -72,6 +73,14 @@ void add_motion(const PolynomialSegment& segment, double at_s, Motion& most) noe
 bool is_well_posed(const SmoothRequest& request) noexcept {
   return is_finite(request.start) && request.limits.validate() == Status::kOk && request.radius_m > 0.0 &&
          request.start.v_W.norm() <= kMaxStart_mps;
+}
+
+/// In narrow places: without this point, near the one before, the straight line to the next is blocked.
+bool is_needed(const MapView& view, const SmoothRequest& request, const Vector3& before_W, std::size_t i,
+               std::uint64_t& lookups) noexcept {
+  return i + 1 < request.path_W.size() && (request.path_W[i] - before_W).norm() > kLeastPiece_m &&
+         is_finite(request.path_W[i + 1]) &&
+         !is_segment_free(view, before_W, request.path_W[i + 1], request.radius_m, lookups);
 }
 
 using Speeds = std::array<double, MinimumSnap::kMaxKnots>;
@@ -278,16 +287,19 @@ Status Smoother::smooth(const SmoothRequest& request, const MapView& map, core::
   // 1. The path from the start state on, without points that stand for the same place.
   result.work = {};
   if (!is_well_posed(request)) return Status::kInvalidArgument;
+  const PolledView view(map, budget, result.work);
   Path path;
-  for (const Vector3& p_W : request.path_W) {
+  for (std::size_t i = 0; i < request.path_W.size(); ++i) {
+    const Vector3& p_W = request.path_W[i];
     if (!is_finite(p_W)) return Status::kInvalidArgument;
-    if (!path.empty() && (p_W - path.back()).norm() < kSameWaypoint_m) continue;
+    if (!path.empty() && (p_W - path.back()).norm() < kSameWaypoint_m &&
+        !is_needed(view, request, path.back(), i, result.work.units))
+      continue;
     if (!path.push_back(path.empty() ? request.start.p_W : p_W)) break;
   }
   if (path.size() < 2) return Status::kInvalidArgument;
 
   // 2. A curve; slower if there is none.
-  const PolledView view(map, budget, result.work);
   const Task task{request, view, budget, result.work};
   MotionLimits limits = request.limits;
   Trajectory candidate;

@@ -164,6 +164,25 @@ TEST(Smoother, StopsAtEachCornerWhereNoCurveFits) {
   EXPECT_TRUE(stops);
 }
 
+TEST(Smoother, KeepsThePointsThatANarrowPathNeeds) {
+  // A tunnel with a step of 0.2 m to the side: a path without one of its two corners touches the walls.
+  test::BoxView view = open_view();
+  view.occupied = {{Vector3(-5, 0.35, -9), Vector3(1.65, 9, 9)},
+                   {Vector3(-5, -9, -9), Vector3(2.35, -0.35, 9)},
+                   {Vector3(2.35, -9, -9), Vector3(9, -0.15, 9)},
+                   {Vector3(1.65, 0.55, -9), Vector3(9, 9, 9)}};
+  SmoothRequest request =
+      request_of({Vector3::Zero(), Vector3(2, 0, 0), Vector3(2, 0.2, 0), Vector3(5, 0.2, 0)});
+  request.radius_m = 0.3;
+  Smoother sut;
+  core::UnlimitedBudget unlimited;
+  SmoothResult result;
+  ASSERT_EQ(sut.smooth(request, view, unlimited, result), Status::kOk);
+  EXPECT_LT((result.trajectory.end_W() - request.path_W.back()).norm(), 1e-6);
+  std::uint64_t lookups = 0;
+  EXPECT_TRUE(is_trajectory_free(view, result.trajectory, 0.0, 0.3, lookups));
+}
+
 TEST(Smoother, NamesDegenerateInput) {
   Smoother sut;
   const test::BoxView view = open_view();
