@@ -34,7 +34,7 @@ constexpr const char* kPortFolder = "/dev/shm";
 constexpr const char* kPortPrefix = "roborun-";
 
 MonotonicTime monotonic_now() {
-  return MonotonicTime{std::chrono::steady_clock::monotonic_now().time_since_epoch()};
+  return MonotonicTime{std::chrono::steady_clock::now().time_since_epoch()};
 }
 
 /// A writer holds the file's lock as long as it lives.
