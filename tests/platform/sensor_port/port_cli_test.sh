@@ -47,5 +47,32 @@ else
   echo "FAILED roborun_port.h is no C99"
   failed=$((failed + 1))
 fi
+# Recorded images.
+kill $feeder 2>/dev/null
+wait $feeder 2>/dev/null
+rm -f "$path"
+folder=$(mktemp -d)
+trap 'kill $feeder 2>/dev/null; rm -rf "$path"* "$folder"' EXIT
+python3 - "$folder" <<'PYTHON'
+import struct, sys, zlib
+def chunk(kind, data):
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+rows = b"".join(b"\0" + struct.pack(">16H", *([2500] * 16)) for _ in range(12))
+png = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 16, 12, 16, 0, 0, 0, 0)) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+for i in range(3):
+    open(f"{sys.argv[1]}/{i}.png", "wb").write(png)
+open(f"{sys.argv[1]}/camera.txt", "w").write("16 16 7.5 5.5 1000\n")
+open(f"{sys.argv[1]}/poses.txt", "w").write("".join(f"{0.1 * i} {i} 0 2 -0.5 0.5 -0.5 0.5\n" for i in range(3)))
+PYTHON
+says 0 "" feed files --from "$folder" --port "$name" --rate 50
+says 1 "no process writes to it" port check "$name" --seconds 0.2
+says 2 "/nonexistent/x: No such file" feed files --from "$folder" --port /nonexistent/x
+says 2 "must be a folder" feed files --from "$folder/nope" --port "$name"
+"$roborun" feed files --from "$folder" --port "$name" --odometry "$name-vio" --rate 50 --loop 2>/dev/null &
+feeder=$!
+sleep 0.4
+says 2 "another process writes to this port" feed files --from "$folder" --port "$name"
+says 0 "16 x 12, 53 x 41 degrees, 100 % of the pixels know something, 0 % see nothing within 10.0 m, nearest 2.50 m" port check "$name"
+says 0 '"device":"odometry","ready":true' port check "$name-vio" --json
 echo "$passed passed, $failed failed"
-[[ $failed -eq 0 && $passed -ge 13 ]]
+[[ $failed -eq 0 && $passed -ge 20 ]]
