@@ -14,11 +14,11 @@ namespace roborun::firmware_if::mavlink {
 /// At 1 Hz from everybody.
 struct Heartbeat {
   static constexpr MessageType kType = kHeartbeat;
-  std::uint8_t type{};             ///< MAV_TYPE; 18: onboard controller.
-  std::uint8_t autopilot{};        ///< MAV_AUTOPILOT; 8: not an autopilot.
-  std::uint8_t base_mode{};        ///< Flags; 128: armed.
-  std::uint32_t custom_mode{};     ///< The autopilot's own number of its mode.
-  std::uint8_t system_status{};    ///< MAV_STATE; 4: active.
+  std::uint8_t type{};              ///< MAV_TYPE; 18: onboard controller.
+  std::uint8_t autopilot{};         ///< MAV_AUTOPILOT; 8: not an autopilot.
+  std::uint8_t base_mode{};         ///< Flags; 128: armed.
+  std::uint32_t custom_mode{};      ///< The autopilot's own number of its mode.
+  std::uint8_t system_status{};     ///< MAV_STATE; 4: active.
   std::uint8_t mavlink_version{3};  ///< 3 in every frame of today.
   static constexpr std::tuple kMembers{Member<&Heartbeat::type>{"type"},
                                        Member<&Heartbeat::autopilot>{"autopilot"},

@@ -33,9 +33,7 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kPortFolder = "/dev/shm";
 constexpr const char* kPortPrefix = "roborun-";
 
-MonotonicTime monotonic_now() {
-  return MonotonicTime{std::chrono::steady_clock::now().time_since_epoch()};
-}
+MonotonicTime monotonic_now() { return MonotonicTime{std::chrono::steady_clock::now().time_since_epoch()}; }
 
 /// A writer holds the file's lock as long as it lives.
 bool is_written_to(const std::string& path) {
