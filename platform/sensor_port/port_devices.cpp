@@ -25,20 +25,23 @@ bool all_finite(const Array& all) noexcept {
   return std::all_of(std::begin(all), std::end(all), [](auto x) { return std::isfinite(x); });
 }
 
+double wide(auto x) noexcept { return static_cast<double>(x); }
+
 bool is_rotation(const auto(&q)[4]) noexcept {
   double square = 0.0;
-  for (const double x : q) square += x * x;
+  for (const auto x : q) square += wide(x) * wide(x);
   return std::fabs(square - 1.0) < 0.02;  // NaN is none
 }
 
 /// The rotation of a unit quaternion, row by row.
 firmware_if::CameraMount mount_of(const roborun_port_mount& m) noexcept {
-  const double w = m.q_BS[0], x = m.q_BS[1], y = m.q_BS[2], z = m.q_BS[3];
+  const auto& q = m.q_BS;
+  const double w = wide(q[0]), x = wide(q[1]), y = wide(q[2]), z = wide(q[3]);
   const double scale = 2.0 / (w * w + x * x + y * y + z * z);
   return {{1 - scale * (y * y + z * z), scale * (x * y - w * z), scale * (x * z + w * y),  //
            scale * (x * y + w * z), 1 - scale * (x * x + z * z), scale * (y * z - w * x),  //
            scale * (x * z - w * y), scale * (y * z + w * x), 1 - scale * (x * x + y * y)},
-          {m.p_BS_m[0], m.p_BS_m[1], m.p_BS_m[2]}};
+          {wide(m.p_BS_m[0]), wide(m.p_BS_m[1]), wide(m.p_BS_m[2])}};
 }
 
 bool is_mount(const roborun_port_mount& m) noexcept { return all_finite(m.p_BS_m) && is_rotation(m.q_BS); }
@@ -50,7 +53,7 @@ bool is_range(float least_m, float most_m) noexcept {
 /// Pixels on the side of the optical axis that has fewer of them: as many are taken on the other. `centre` counts from the edge.
 std::uint32_t half_of(float centre, std::uint32_t pixels) noexcept {
   const float fewer = std::min(centre, static_cast<float>(pixels) - centre);
-  return fewer > 0.0F ? static_cast<std::uint32_t>(fewer + 0.5F) : 0;
+  return fewer > 0.0F ? static_cast<std::uint32_t>(std::lround(fewer)) : 0;
 }
 
 constexpr std::uint32_t kLeastPixels = 8, kMostPixels = 1280;
@@ -79,7 +82,7 @@ Window window_of(const roborun_port_depth& d) noexcept {
   const std::uint32_t across = std::min(half_of(d.cx + 0.5F, d.width), d.width / 2);
   const std::uint32_t down = std::min(half_of(d.cy + 0.5F, d.height), d.height / 2);
   const auto from = [](float centre, std::uint32_t half, std::uint32_t pixels) {
-    const double first = std::round(double{centre} + 0.5 - half);
+    const double first = std::round(wide(centre) + 0.5 - wide(half));
     return static_cast<std::uint32_t>(std::clamp(first, 0.0, static_cast<double>(pixels - 2 * half)));
   };
   return {from(d.cx, across, d.width), from(d.cy, down, d.height), 2 * across, 2 * down};

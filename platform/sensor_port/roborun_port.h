@@ -11,6 +11,7 @@
 /// sample n for the greatest n below `written` with n % slot_count == i. A slot's guard is 2 n + 1 while sample n is being
 /// written and 2 n + 2 once it is whole: a reader copies, looks at the guard before and after, and takes only what did
 /// not change in between. The writer never waits for a reader, and readers write nothing.
+/* NOLINTBEGIN(readability-identifier-naming,modernize-use-nullptr): this is C */
 #ifndef ROBORUN_PORT_H
 #define ROBORUN_PORT_H
 
@@ -283,3 +284,4 @@ static inline int roborun_port_write(struct roborun_port_writer* w, const void* 
 #pragma GCC diagnostic pop
 #endif
 #endif
+/* NOLINTEND(readability-identifier-naming,modernize-use-nullptr) */

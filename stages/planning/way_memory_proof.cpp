@@ -118,7 +118,7 @@ bool WayMemory::has_passed(const Cell& place) const noexcept {
   const std::uint32_t position = position_of(block);
   if (node_[node_of(position, 0)].reached != search_) return false;
   const std::int32_t kind = kind_at(position);
-  const auto row = static_cast<std::size_t>(kBlockCells * (place.z & 15) + (place.y & 15));
+  const auto row = kRow * static_cast<std::size_t>(place.z & 15) + static_cast<std::size_t>(place.y & 15);
   return kind < 0 ||
          ((block_[static_cast<std::size_t>(kind)].passed[row] >> static_cast<unsigned>(place.x & 15)) & 1) !=
              0;
@@ -156,7 +156,7 @@ Status WayMemory::may_lead(const Vector3& from_W, const Vector3& goal_W, core::S
   const Cell last{goal.x >> 4, goal.y >> 4, goal.z >> 4};
   if (!in_search(first)) return Status::kInfeasible;
   CellRows from{};
-  from[static_cast<std::size_t>(kBlockCells * (start.z & 15) + (start.y & 15))] =
+  from[kRow * static_cast<std::size_t>(start.z & 15) + static_cast<std::size_t>(start.y & 15)] =
       static_cast<std::uint16_t>(1U << static_cast<unsigned>(start.x & 15));
   pass_into(first, from, last);
   if (!has_passed(start)) return Status::kInfeasible;  // it is where nothing can be
