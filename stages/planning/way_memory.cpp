@@ -16,7 +16,7 @@ constexpr std::int32_t kWindow = 13, kWindowHeight = 9;  // blocks of one look, 
 constexpr std::size_t kWindowBlocks =
     static_cast<std::size_t>(kWindow + 1) * (kWindow + 1) * (kWindowHeight + 1);
 constexpr double kStands_m = 0.3;  // from one look to the next
-constexpr std::uint32_t kMostWaits = 128;
+constexpr int kMostWaits = 128;
 constexpr std::uint64_t kWorkOfABlock = 64;  // lookups that a block that changed counts as
 
 std::int32_t whole(double x) noexcept { return static_cast<std::int32_t>(std::floor(x)); }
@@ -267,11 +267,13 @@ Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, c
         if (before == 0) position_pool_.use(++seen_count_);
         before = digest;
         renew({x, y, z}, cells);
+        position_[position_of({x, y, z})].is_new = true;
         changed_[changed++] = {x, y, z};
       }
     }
   }
   for (std::size_t i = 0; i < changed; ++i) find_doors(changed_[i]);
+  for (std::size_t i = 0; i < changed; ++i) position_[position_of(changed_[i])].is_new = false;
   return spent ? Status::kBudgetSpent : Status::kOk;
 }
 
@@ -283,8 +285,8 @@ void WayMemory::wait_at(const Vector3& p_W) noexcept {
   for (std::int32_t i = 0; i < 27; ++i) {
     const Cell block{(at.x >> 4) + i % 3 - 1, (at.y >> 4) + i / 3 % 3 - 1, (at.z >> 4) + i / 9 - 1};
     if (!has(block)) continue;
-    std::uint32_t& waits = position_[position_of(block)].waits;
-    waits = std::min(waits + 1, kMostWaits);
+    std::uint16_t& waits = position_[position_of(block)].waits;
+    waits = static_cast<std::uint16_t>(std::min(waits + 1, kMostWaits));
   }
 }
 
@@ -353,7 +355,8 @@ void WayMemory::find_doors(const Cell& block) noexcept {
     const Cell next{block.x + (face / 2 == 0 ? by : 0), block.y + (face / 2 == 1 ? by : 0),
                     block.z + (face / 2 == 2 ? by : 0)};
     const std::int32_t other = has(next) ? kind_at(position_of(next)) : kClosed;
-    if (other >= 0) find_face_doors(block_[static_cast<std::size_t>(other)], next, face ^ 1U);
+    if (other >= 0 && !position_[position_of(next)].is_new)  // those have a turn of their own
+      find_face_doors(block_[static_cast<std::size_t>(other)], next, face ^ 1U);
   }
 }
 
@@ -361,44 +364,41 @@ void WayMemory::find_face_doors(Block& b, const Cell& block, std::size_t face) n
   b.doors[face] = 0;
   const std::int32_t side = face % 2 == 0 ? 15 : 0;
   const std::int32_t by = face % 2 == 0 ? 1 : -1;
-  struct Pair {
-    int count, u, v;
-  };
-  std::array<Pair, std::size_t{kRooms} * kRooms> pair{};
-  const auto cell = [face, side](int u, int v) {
-    return face / 2 == 0 ? Cell{side, u, v} : face / 2 == 1 ? Cell{u, side, v} : Cell{u, v, side};
-  };
   const Cell step{face / 2 == 0 ? by : 0, face / 2 == 1 ? by : 0, face / 2 == 2 ? by : 0};
   const Cell next{block.x + step.x, block.y + step.y, block.z + step.z};
   const std::int32_t kind = has(next) ? kind_at(position_of(next)) : kClosed;
   if (kind == kClosed) return;
-  const auto rooms_at = [&](int u, int v) {
-    const Cell c = cell(u, v);
-    const unsigned room = b.rooms.at(c.x, c.y, c.z);
-    const Cell in_next{(c.x + step.x) & 15, (c.y + step.y) & 15, (c.z + step.z) & 15};
-    const unsigned other = room == 0 ? 0 : room_at(kind, in_next);
-    return other == 0 ? 0U : kRooms * room + other;
+  const auto cell = [face, side](int u, int v) {
+    return face / 2 == 0 ? Cell{side, u, v} : face / 2 == 1 ? Cell{u, side, v} : Cell{u, v, side};
   };
+  struct Pair {
+    int count, u, v;
+    int away, at;  // of the place that is nearest to their middle
+  };
+  std::array<Pair, std::size_t{kRooms} * kRooms> pair{};
   std::array<std::uint8_t, 256> at{};
   for (int i = 0; i < 256; ++i) {
-    const unsigned rooms = rooms_at(i % 16, i / 16);
-    at[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(rooms);
+    const Cell c = cell(i % 16, i / 16);
+    const unsigned room = b.rooms.at(c.x, c.y, c.z);
+    if (room == 0) continue;
+    const unsigned other = room_at(kind, {(c.x + step.x) & 15, (c.y + step.y) & 15, (c.z + step.z) & 15});
+    if (other == 0) continue;
+    at[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(kRooms * room + other);
+    Pair& p = pair[kRooms * room + other];
+    ++p.count, p.u += i % 16, p.v += i / 16;
+    p.away = 1 << 30;
+  }
+  for (int i = 0; i < 256; ++i) {
+    const std::uint8_t rooms = at[static_cast<std::size_t>(i)];
+    if (rooms == 0) continue;
     Pair& p = pair[rooms];
-    ++p.count;
-    p.u += i % 16;
-    p.v += i / 16;
+    const int du = p.count * (i % 16) - p.u, dv = p.count * (i / 16) - p.v;
+    if (du * du + dv * dv < p.away) p.away = du * du + dv * dv, p.at = i;
   }
   for (unsigned rooms = 1; rooms < pair.size() && b.doors[face] < kDoorsPerFace; ++rooms) {
     const Pair& p = pair[rooms];
     if (p.count == 0) continue;
-    // Of its places the one nearest to the middle.
-    int best = 1 << 30, best_at = 0;
-    for (int i = 0; i < 256; ++i) {
-      if (at[static_cast<std::size_t>(i)] != rooms) continue;
-      const int du = p.count * (i % 16) - p.u, dv = p.count * (i / 16) - p.v;
-      if (du * du + dv * dv < best) best = du * du + dv * dv, best_at = i;
-    }
-    const Cell c = cell(best_at % 16, best_at / 16);
+    const Cell c = cell(p.at % 16, p.at / 16);
     b.door[face][b.doors[face]++] = {
         static_cast<std::uint8_t>(rooms / kRooms), static_cast<std::uint8_t>(rooms % kRooms),
         static_cast<std::uint8_t>(c.x), static_cast<std::uint8_t>(c.y), static_cast<std::uint8_t>(c.z)};

@@ -75,7 +75,8 @@ class WayMemory final : public Ways {
   static constexpr std::int32_t kOpen = -1, kKnown = -2, kClosed = -3;
   struct Position {
     std::int32_t kind{kOpen};
-    std::uint32_t waits{};   ///< Looks during which the vehicle stood beside it.
+    std::uint16_t waits{};   ///< Looks during which the vehicle stood beside it.
+    bool is_new{};           ///< In this look; false between looks.
     std::uint64_t digest{};  ///< Of the cells that its places touch, when it was last looked at; 0: never.
   };
   /// A block of the map.

@@ -40,29 +40,31 @@ CellRows across(const CellRows& rows, std::size_t face) noexcept {
 }  // namespace
 
 CellRows WayMemory::find_passable(const Cell& block, const WayCells& cells) const noexcept {
-  WayPlaces places;
-  find_places(cells, core_width_, places);
-  CellRows passable{};
-  for (std::size_t i = 0; i < passable.size(); ++i)
-    passable[i] = static_cast<std::uint16_t>(places.known[i] | places.open[i]);
-  const Cell first{kBlockCells * block.x, kBlockCells * block.y, kBlockCells * block.z};
-  const Aabb& bounds_W = config_.bounds_W;
-  const auto box_W = [&](const Cell& c, double wide) {
-    const Vector3 low(c.x + corner_.x, c.y + corner_.y, c.z + corner_.z);
-    const double middle = 0.5 * core_width_;
-    return Aabb{config_.finest_m * (low + Vector3::Constant(middle - wide)),
-                config_.finest_m * (low + Vector3::Constant(middle + wide))};
-  };
-  for (std::int32_t i = 0; i < 256; ++i) {
-    std::uint16_t& row = passable[static_cast<std::size_t>(i)];
-    for (unsigned bits = row; bits != 0; bits &= bits - 1) {
-      const std::int32_t x = __builtin_ctz(bits);
-      const Cell place{first.x + x, first.y + i % kBlockCells, first.z + i / kBlockCells};
-      // Where the vehicle's centre is while this is the cube inside it.
-      const Aabb centre_W = box_W(place, 0.5);
-      const bool inside = (centre_W.max_W.array() > bounds_W.min_W.array()).all() &&
-                          (centre_W.min_W.array() < bounds_W.max_W.array()).all();
-      if (!inside || (!config_.fence.empty() && !config_.fence.allows(box_W(place, 0.5 * core_width_))))
+  CellRows passable = find_not_closed(cells, core_width_);
+  const std::array<std::int32_t, 3> first{kBlockCells * block.x + corner_.x,
+                                          kBlockCells * block.y + corner_.y,
+                                          kBlockCells * block.z + corner_.z};
+  // Per axis the places whose vehicle may have its centre inside the bounds.
+  std::array<unsigned, 3> inside{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<int>(axis);
+    for (std::int32_t i = 0; i < kBlockCells; ++i) {
+      const double centre_m = config_.finest_m * (first[axis] + i + 0.5 * core_width_);
+      const bool is_inside = centre_m + 0.5 * config_.finest_m > config_.bounds_W.min_W[a] &&
+                             centre_m - 0.5 * config_.finest_m < config_.bounds_W.max_W[a];
+      inside[axis] |= is_inside ? 1U << static_cast<unsigned>(i) : 0U;
+    }
+  }
+  for (unsigned i = 0; i < 256; ++i) {
+    std::uint16_t& row = passable[i];
+    const bool is_inside = ((inside[1] >> (i % kRow)) & (inside[2] >> (i / kRow)) & 1U) != 0;
+    row = static_cast<std::uint16_t>(is_inside ? row & inside[0] : 0U);
+    for (unsigned bits = config_.fence.empty() ? 0U : row; bits != 0; bits &= bits - 1) {
+      const int x = __builtin_ctz(bits);
+      const Vector3 low(first[0] + x, first[1] + static_cast<int>(i % kRow),
+                        first[2] + static_cast<int>(i / kRow));
+      const Aabb cube_W{config_.finest_m * low, config_.finest_m * (low + Vector3::Constant(core_width_))};
+      if (!config_.fence.allows(cube_W))
         row = static_cast<std::uint16_t>(row & ~(1U << static_cast<unsigned>(x)));
     }
   }

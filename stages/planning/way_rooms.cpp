@@ -28,10 +28,13 @@ void gather(const WayCells& cells, std::size_t side, bool occupied, WideRows& ro
 /// Each cell becomes true if any of the `width` cells from it on is, along all three axes.
 void spread(std::size_t side, int width, WideRows& rows) noexcept {
   const auto many = static_cast<std::size_t>(width);
-  for (std::uint32_t& row : rows) {
-    std::uint32_t all = row;
-    for (int i = 1; i < width; ++i) all |= row >> static_cast<unsigned>(i);
-    row = all;
+  for (std::size_t z = 0; z < side; ++z) {
+    for (std::size_t y = 0; y < side; ++y) {
+      const std::uint32_t row = rows[kSide * z + y];
+      std::uint32_t all = row;
+      for (int i = 1; i < width; ++i) all |= row >> static_cast<unsigned>(i);
+      rows[kSide * z + y] = all;
+    }
   }
   for (const std::size_t stride : {std::size_t{1}, kSide}) {
     for (std::size_t z = 0; z < side; ++z) {
@@ -82,6 +85,17 @@ void find_places(const WayCells& cells, int width, WayPlaces& places) noexcept {
     places.known[i] = static_cast<std::uint16_t>(~blocked[at]);
     places.open[i] = static_cast<std::uint16_t>(blocked[at] & ~shut[at]);
   }
+}
+
+CellRows find_not_closed(const WayCells& cells, int width) noexcept {
+  const auto side = static_cast<std::size_t>(kBlockCells + width - 1);
+  WideRows shut{};
+  gather(cells, side, true, shut);
+  spread(side, width, shut);
+  CellRows rows{};
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i] = static_cast<std::uint16_t>(~shut[kSide * (i / kBlockCells) + i % kBlockCells]);
+  return rows;
 }
 
 void flood(const CellRows& rows, CellRows& room) noexcept {
