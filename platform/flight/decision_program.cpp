@@ -123,19 +123,19 @@ void DecisionProgram::blur(const stages::EstimatedState& state) noexcept {
 void DecisionProgram::judge_frames(bool airborne) noexcept {
   // The same judge as in point cloud and map: what it refuses counts as not seen, for the failsafe too.
   guard_.begin({frames_.begin(), frames_.size()});
-  std::array<bool, kMostImages> disagrees{};
+  std::array<bool, kMostImages> turned{};
   int disagree = 0, agree = 0;
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     fault_[i] = guard_.judge(frames_[i]);
     if (!airborne || fault_[i] != stages::FrameFault::kNone || frames_[i].is_cloud) continue;
     const Agreement agreement = agreement_of(frames_[i], pipeline_.view());
-    disagrees[i] = agreement == Agreement::kDisagrees;
-    disagree += disagrees[i] ? 1 : 0;
+    turned[i] = agreement == Agreement::kTurned;
+    disagree += turned[i] || agreement == Agreement::kDisagrees ? 1 : 0;
     agree += agreement == Agreement::kAgrees ? 1 : 0;
   }
   if (disagree > 1 && agree == 0) return drop_map();
   for (std::size_t i = 0; i < frames_.size(); ++i)
-    if (disagrees[i]) fault_[i] = stages::FrameFault::kTurned;
+    if (turned[i]) fault_[i] = stages::FrameFault::kTurned;
 }
 
 void DecisionProgram::drop_map() noexcept {

@@ -88,8 +88,8 @@ class DecisionProgram final : public core::LaneProgram {
   /// Reads all sensors: frames_ are the images that may be used, and the depth's age is that of the sensor
   /// that is worst off.
   void look(const FlightReport& report, MonotonicTime now) noexcept;
-  /// fault_ of what was read. One camera that disagrees with the map all over while another one agrees, or that is the only one that
-  /// can tell, was turned: its images are not believed. If all disagree, it is the estimate: the map is dropped.
+  /// fault_ of what was read. Images of a camera whose disagreement with the map a turn explains are not believed. If several
+  /// cameras disagree, explained or not, and none agrees, it is the estimate: the map is dropped.
   void judge_frames(bool airborne) noexcept;
   void drop_map() noexcept;
   /// Notes what became of an image: a sensor is out of use since its last image that was usable, or, if its newest ones are

@@ -196,6 +196,8 @@ Status Estimator::update(const firmware_if::GnssFix& fix) noexcept {
   bool accepted = false;
   if (follows_odometry(fix.stamp)) {
     accepted = place_frame(fix, dp_m);
+  } else if (largest_sigma_m(fix) > kMapLost_m) {
+    accepted = place_coarsely(fix, dp_m, v_W - then->v_WB, core::yaw_of(then->q_WB));
   } else {
     const double gate_m = config_.gate_sigma * core::hypot2(largest_sigma_m(fix), position_sigma_m());
     accepted = correct_by(fix, dp_m, v_W - then->v_WB, core::yaw_of(then->q_WB));
@@ -350,6 +352,15 @@ bool Estimator::place_frame(const firmware_if::GnssFix& fix, const Vector3& inno
   return true;
 }
 
+bool Estimator::place_coarsely(const firmware_if::GnssFix& fix, const Vector3& dp_m, const Vector3& dv_mps,
+                               double yaw_rad) noexcept {
+  const auto verdict = shift_.update(dp_m, largest_sigma_m(fix), config_.gate_sigma, fix.stamp);
+  if (verdict == FrameShift::Verdict::kRefused) ++counters_.refused_gate;
+  if (verdict == FrameShift::Verdict::kJumped) ++counters_.jumps;
+  // No innovation of the position: it keeps the variance from growing, as a fix does, and moves nothing.
+  return correct_by(fix, Vector3::Zero(), dv_mps, yaw_rad) && verdict != FrameShift::Verdict::kRefused;
+}
+
 Status Estimator::state(EstimatedState& out) const noexcept {
   if (!started_) return Status::kNotReady;
   out = state_;
@@ -357,7 +368,8 @@ Status Estimator::state(EstimatedState& out) const noexcept {
   out.map_sigma_rad = std::sqrt(std::fmax(P_(6, 6), std::fmax(P_(7, 7), P_(8, 8))));
   out.shift_W = shift_.shift_W();
   out.drift_ratio = anchor_ ? config_.drift_ratio : 0.0;
-  out.position_sigma_m = anchor_ ? core::hypot2(out.map_sigma_m, shift_.sigma_m()) : out.map_sigma_m;
+  const bool is_shifted = anchor_ || shift_.sigma_m() > kMapLost_m;
+  out.position_sigma_m = is_shifted ? core::hypot2(out.map_sigma_m, shift_.sigma_m()) : out.map_sigma_m;
   out.map_number = map_number_;
   return Status::kOk;
 }

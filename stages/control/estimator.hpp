@@ -45,7 +45,8 @@ struct EstimatedState {
 ///  1. the IMU, always: whatever else jumps against it is not followed;
 ///  2. odometry, where it is heard: fixes then only say where the flown frame lies on the earth (FrameShift), the heading
 ///     of fixes only at the start, and the barometer nothing;
-///  3. fixes, less the shift known by then, with their heading;
+///  3. fixes, less the shift known by then, with their heading. Those coarser than kMapLost_m wander by more than a cell: their
+///     speed and heading are followed, and their position moves the shift alone, so that the map stays where it is;
 ///  4. the barometer, for the height alone.
 /// A vehicle that hears odometry for kFixPatience and no fix with a heading starts without: W is then O. Odometry that begins
 /// anew (reset_counter), that comes back, or that jumps without a word is anchored where the vehicle is by then, once its
@@ -143,6 +144,9 @@ class Estimator {
                   const PastStates::Past& then) noexcept;
   /// What a fix says of the flown frame while odometry holds it.
   [[nodiscard]] bool place_frame(const firmware_if::GnssFix& fix, const Vector3& innovation_m) noexcept;
+  /// A fix that is coarser than the map's cells, without odometry: true if all of it was believed.
+  [[nodiscard]] bool place_coarsely(const firmware_if::GnssFix& fix, const Vector3& dp_m,
+                                    const Vector3& dv_mps, double yaw_rad) noexcept;
   [[nodiscard]] double position_sigma_m() const noexcept;
   void propagate_covariance(double dt_s) noexcept;
   /// One scalar measurement of error state `index`; false if gated out.

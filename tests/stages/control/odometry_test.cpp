@@ -240,6 +240,25 @@ TEST(Odometry, FixesOfAnOrdinaryReceiverDoNotMoveTheMap) {
   EXPECT_GT(f.state().position_sigma_m, 1.2) << "averaging takes nothing of it away";
 }
 
+TEST(Odometry, WithoutItFixesOfAnOrdinaryReceiverMoveTheGoalAlone) {
+  Flight f;
+  f.has_odometry = false;
+  f.gnss_sigma_m = 1.3;
+  f.fly(20.0);
+  Steps steps;
+  f.gnss_error_m = Vector3(1.0, 2.0, 0.0);
+  const Vector3 before_m = f.state().p_WB - Flight::p_W(20.0);
+  f.fly(80.0, std::ref(steps));
+  EXPECT_LT(steps.most_m, 0.02);
+  const Vector3 wandered_m = f.state().p_WB - Flight::p_W(80.0) - before_m;
+  EXPECT_LT(wandered_m.norm(), 0.6) << "in a minute by its speed alone; by 2.2 m if it followed";
+  EXPECT_LT((f.state().p_WB + f.state().shift_W - Flight::p_W(80.0) - f.gnss_error_m).norm(), 0.3)
+      << "the goal does";
+  EXPECT_EQ(f.state().map_number, 0U);
+  EXPECT_GT(f.state().position_sigma_m, 1.2) << "on the earth";
+  EXPECT_LT(f.state().map_sigma_m, 0.3) << "against the map";
+}
+
 TEST(Odometry, WithoutItAJumpOfFixesMovesTheGoalAlone) {
   Flight f;
   f.has_odometry = false;
