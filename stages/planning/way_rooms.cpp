@@ -129,11 +129,14 @@ void flood(const CellRows& rows, CellRows& room) noexcept {
     if (i % kBlockCells < kBlockCells - 1) near |= room[i + 1];
     if (i >= kBlockCells) near |= room[i - kBlockCells];
     if (i + kBlockCells < room.size()) near |= room[i + kBlockCells];
+    if ((near & rows[i]) == room[i]) return false;  // all along x is in it
     const std::uint16_t grown = along_x(near & rows[i], rows[i]);
     const bool more = grown != room[i];
     room[i] = grown;
     return more;
   };
+  for (std::size_t i = 0; i < room.size(); ++i)
+    if (room[i] != 0) room[i] = along_x(room[i] & rows[i], rows[i]);
   // Each round there and back reaches at least one place more: a room has at most 4,096.
   for (int round = 0; round < 4096; ++round) {
     bool more = false;
