@@ -316,7 +316,7 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   std::int32_t uniform = all(places.known, 0xFFFF) ? kKnown : all(places.open, 0xFFFF) ? kOpen : 0;
   CellRows passable{};
   if (uniform == 0) {
-    passable = find_passable(block, cells);
+    passable = find_passable(block, cells, places);
     if (all(places.known, 0) && all(places.open, 0) && all(passable, 0)) uniform = kClosed;
   }
   if (uniform < 0) {

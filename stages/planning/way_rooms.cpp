@@ -103,17 +103,6 @@ void find_places(const WayCells& cells, int width, WayPlaces& places) noexcept {
   }
 }
 
-CellRows find_not_closed(const WayCells& cells, int width) noexcept {
-  const auto side = static_cast<std::size_t>(kBlockCells + width - 1);
-  WideRows rows{};
-  gather(cells, side, rows);
-  spread(side, width, rows);
-  CellRows open{};
-  for (std::size_t i = 0; i < open.size(); ++i)
-    open[i] = static_cast<std::uint16_t>(~rows[kSide * (i / kBlockCells) + i % kBlockCells]);
-  return open;
-}
-
 void flood(const CellRows& rows, CellRows& room) noexcept {
   const auto along_x = [](std::uint32_t seed, std::uint32_t row) {
     for (std::uint32_t before = 0; seed != before;) {
