@@ -22,6 +22,29 @@ constexpr std::array<std::uint32_t, 256> make_spread() noexcept {
 }
 constexpr std::array<std::uint32_t, 256> kSpreadBits = make_spread();
 
+/// Of a word's first cell the row 16 z + y and x. The cells of a word are 4 x 2 x 2, x lowest and highest.
+struct PlaceOfWord {
+  std::uint8_t row, x;
+};
+constexpr auto kPlaceOfWord = [] {
+  std::array<PlaceOfWord, 256> place{};
+  for (std::size_t w = 0; w < place.size(); ++w) {
+    std::array<unsigned, 3> at{};
+    for (unsigned bit = 0; bit < 8; ++bit)  // of the Morton index, from 4 on
+      at[(bit + 4) % 3] |= static_cast<unsigned>((w >> bit) & 1U) << ((bit + 4) / 3);
+    place[w] = {static_cast<std::uint8_t>(kBlockCells * at[2] + at[1]), static_cast<std::uint8_t>(at[0])};
+  }
+  return place;
+}();
+
+/// Bit 4 k becomes bit k; no others are set.
+constexpr std::uint32_t gather_ones(Word bits) noexcept {
+  bits = (bits | (bits >> 3U)) & 0x0303'0303'0303'0303ULL;
+  bits = (bits | (bits >> 6U)) & 0x000F'000F'000F'000FULL;
+  bits = (bits | (bits >> 12U)) & 0x0000'00FF'0000'00FFULL;
+  return static_cast<std::uint32_t>((bits | (bits >> 24U)) & 0xFFFFU);
+}
+
 /// The lowest bit of each half byte that holds something thin: odd, more than 1, less than 8.
 constexpr Word thin_in(Word word) noexcept {
   return word & ((word >> 1U) | (word >> 2U)) & ~(word >> 3U) & kOnes;
@@ -105,23 +128,17 @@ void Brick::refresh() noexcept {
 void Brick::read(CellBlock& cells) const noexcept {
   cells = {};
   for (std::size_t w = 0; w < word.size(); ++w) {
-    // The cells of a word are 4 x 2 x 2, x lowest and highest.
-    std::size_t cx = 0, cy = 0, cz = 0;
-    for (unsigned bit = 0; bit < 8; ++bit) {  // of the Morton index, from 4 on
-      const std::size_t set = (w >> bit) & 1U;
-      const unsigned axis = (bit + 4) % 3, power = (bit + 4) / 3;
-      (axis == 0 ? cx : axis == 1 ? cy : cz) |= set << power;
-    }
+    if (word[w] == kOnes * evidence::kUnknown) continue;
+    const auto [first_row, cx] = kPlaceOfWord[w];
     const Word not_free = word[w] ^ (kOnes * evidence::kFree);
     const Word folded = not_free | (not_free >> 1U) | (not_free >> 2U) | (not_free >> 3U);
-    const Word free = ~folded & kOnes, occupied = ((word[w] >> 3U) & kOnes) | thin_in(word[w]);
+    const std::uint32_t free = gather_ones(~folded & kOnes);
+    const std::uint32_t occupied = gather_ones(((word[w] >> 3U) & kOnes) | thin_in(word[w]));
     for (unsigned pair = 0; pair < 4; ++pair) {
-      const auto four = [pair](Word bits) {
-        const Word b = bits >> (8U * pair);
-        const Word high = bits >> (8U * pair + 32U);
-        return (b & 1U) | ((b >> 3U) & 2U) | ((high << 2U) & 4U) | ((high >> 1U) & 8U);
+      const auto four = [pair](std::uint32_t bits) {
+        return (bits >> (2U * pair) & 3U) | (bits >> (2U * pair + 6U) & 12U);
       };
-      const std::size_t row = kBlockCells * (cz + pair / 2) + cy + pair % 2;
+      const std::size_t row = first_row + kBlockCells * (pair / 2) + pair % 2;
       cells.free[row] = static_cast<std::uint16_t>(cells.free[row] | (four(free) << cx));
       cells.occupied[row] = static_cast<std::uint16_t>(cells.occupied[row] | (four(occupied) << cx));
     }

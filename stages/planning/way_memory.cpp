@@ -1,7 +1,6 @@
 #include "stages/planning/way_memory.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "core/random/counter_rng.hpp"
@@ -31,23 +30,6 @@ std::uint64_t digest_of(const CellBlock& cells) noexcept {
     digest ^= digest >> 29U;
   }
   return digest;
-}
-
-/// Of a row of places those in known rooms that have one in an open room beside them: the highest of each place's four bits, which says
-/// of a room whether it is open. So a row is one operation.
-std::uint64_t known_beside_open(const WayRooms& rooms, std::int32_t y, std::int32_t z) noexcept {
-  static_assert(kFirstOpenRoom == 8 && kRooms == 16);
-  constexpr std::uint64_t kHigh = 0x8888'8888'8888'8888ULL;
-  const auto row = [&rooms](std::int32_t at_y, std::int32_t at_z) {
-    return ((at_y | at_z) & ~15) != 0
-               ? 0
-               : rooms.number[16 * static_cast<std::size_t>(at_z) + static_cast<std::size_t>(at_y)];
-  };
-  const std::uint64_t n = row(y, z);
-  const std::uint64_t known = (n << 1U | n << 2U | n << 3U) & ~n;
-  const std::uint64_t beside =
-      n << 4U | n >> 4U | row(y - 1, z) | row(y + 1, z) | row(y, z - 1) | row(y, z + 1);
-  return known & beside & kHigh;
 }
 
 }  // namespace
@@ -298,18 +280,20 @@ void WayMemory::forbid(const Cell& block, WayPlaces& places) const noexcept {
   if (bounds_W.contains(low_W) && bounds_W.contains(high_W) &&
       (config_.fence.empty() || config_.fence.allows(Aabb{low_W - r, high_W + r})))
     return;
-  const auto within = [&bounds_W](const Vector3& p_W, int axis) {
-    return p_W[axis] >= bounds_W.min_W[axis] && p_W[axis] <= bounds_W.max_W[axis];
-  };
-  unsigned inside = 0;  // of a row
-  for (std::int32_t x = 0; x < kBlockCells; ++x)
-    inside |= within(at_W({first.x + x, first.y, first.z}), 0) ? 1U << static_cast<unsigned>(x) : 0U;
+  // Per axis the places inside the bounds.
+  std::array<unsigned, 3> inside{};
+  for (std::int32_t i = 0; i < kBlockCells; ++i) {
+    const Vector3 p_W = at_W({first.x + i, first.y + i, first.z + i});
+    for (int axis = 0; axis < 3; ++axis)
+      if (p_W[axis] >= bounds_W.min_W[axis] && p_W[axis] <= bounds_W.max_W[axis])
+        inside[static_cast<std::size_t>(axis)] |= 1U << static_cast<unsigned>(i);
+  }
   for (std::int32_t i = 0; i < 256; ++i) {
     const Cell row{first.x, first.y + i % kBlockCells, first.z + i / kBlockCells};
-    const Vector3 row_W = at_W(row);
     std::uint16_t &known = places.known[static_cast<std::size_t>(i)],
                   &open = places.open[static_cast<std::size_t>(i)];
-    unsigned keep = within(row_W, 1) && within(row_W, 2) ? inside & static_cast<unsigned>(known | open) : 0U;
+    const bool is_inside = ((inside[1] >> (i % kBlockCells)) & (inside[2] >> (i / kBlockCells)) & 1U) != 0;
+    unsigned keep = is_inside ? inside[0] & static_cast<unsigned>(known | open) : 0U;
     for (unsigned bits = config_.fence.empty() ? 0U : keep; bits != 0; bits &= bits - 1) {
       const std::int32_t x = __builtin_ctz(bits);
       const Vector3 p_W = at_W({row.x + x, row.y, row.z});
@@ -332,7 +316,7 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   std::int32_t uniform = all(places.known, 0xFFFF) ? kKnown : all(places.open, 0xFFFF) ? kOpen : 0;
   CellRows passable{};
   if (uniform == 0) {
-    passable = find_passable(block, cells);
+    passable = find_passable(block, cells, places);
     if (all(places.known, 0) && all(places.open, 0) && all(passable, 0)) uniform = kClosed;
   }
   if (uniform < 0) {
@@ -344,112 +328,6 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   if (b == nullptr) return;
   number_rooms(places, b->rooms);
   b->passable = passable;
-}
-
-void WayMemory::find_doors(const Cell& block) noexcept {
-  const std::int32_t kind = kind_at(position_of(block));
-  if (kind >= 0) find_inner_doors(block_[static_cast<std::size_t>(kind)]);
-  for (std::size_t face = 0; face < kFaces; ++face) {
-    if (kind >= 0) find_face_doors(block_[static_cast<std::size_t>(kind)], block, face);
-    const std::int32_t by = face % 2 == 0 ? 1 : -1;
-    const Cell next{block.x + (face / 2 == 0 ? by : 0), block.y + (face / 2 == 1 ? by : 0),
-                    block.z + (face / 2 == 2 ? by : 0)};
-    const std::int32_t other = has(next) ? kind_at(position_of(next)) : kClosed;
-    if (other >= 0 && !position_[position_of(next)].is_new)  // those have a turn of their own
-      find_face_doors(block_[static_cast<std::size_t>(other)], next, face ^ 1U);
-  }
-}
-
-void WayMemory::find_face_doors(Block& b, const Cell& block, std::size_t face) noexcept {
-  b.doors[face] = 0;
-  const std::int32_t side = face % 2 == 0 ? 15 : 0;
-  const std::int32_t by = face % 2 == 0 ? 1 : -1;
-  const Cell step{face / 2 == 0 ? by : 0, face / 2 == 1 ? by : 0, face / 2 == 2 ? by : 0};
-  const Cell next{block.x + step.x, block.y + step.y, block.z + step.z};
-  const std::int32_t kind = has(next) ? kind_at(position_of(next)) : kClosed;
-  if (kind == kClosed) return;
-  const auto cell = [face, side](int u, int v) {
-    return face / 2 == 0 ? Cell{side, u, v} : face / 2 == 1 ? Cell{u, side, v} : Cell{u, v, side};
-  };
-  struct Pair {
-    int count, u, v;
-    int away, at;  // of the place that is nearest to their middle
-  };
-  std::array<Pair, std::size_t{kRooms} * kRooms> pair{};
-  std::array<std::uint8_t, 256> at{};
-  for (int i = 0; i < 256; ++i) {
-    const Cell c = cell(i % 16, i / 16);
-    const unsigned room = b.rooms.at(c.x, c.y, c.z);
-    if (room == 0) continue;
-    const unsigned other = room_at(kind, {(c.x + step.x) & 15, (c.y + step.y) & 15, (c.z + step.z) & 15});
-    if (other == 0) continue;
-    at[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(kRooms * room + other);
-    Pair& p = pair[kRooms * room + other];
-    ++p.count, p.u += i % 16, p.v += i / 16;
-    p.away = 1 << 30;
-  }
-  for (int i = 0; i < 256; ++i) {
-    const std::uint8_t rooms = at[static_cast<std::size_t>(i)];
-    if (rooms == 0) continue;
-    Pair& p = pair[rooms];
-    const int du = p.count * (i % 16) - p.u, dv = p.count * (i / 16) - p.v;
-    if (du * du + dv * dv < p.away) p.away = du * du + dv * dv, p.at = i;
-  }
-  for (unsigned rooms = 1; rooms < pair.size() && b.doors[face] < kDoorsPerFace; ++rooms) {
-    const Pair& p = pair[rooms];
-    if (p.count == 0) continue;
-    const Cell c = cell(p.at % 16, p.at / 16);
-    b.door[face][b.doors[face]++] = {
-        static_cast<std::uint8_t>(rooms / kRooms), static_cast<std::uint8_t>(rooms % kRooms),
-        static_cast<std::uint8_t>(c.x), static_cast<std::uint8_t>(c.y), static_cast<std::uint8_t>(c.z)};
-  }
-}
-
-void WayMemory::find_inner_doors(Block& b) noexcept {
-  b.doors[kInside] = 0;
-  struct Pair {
-    int count, x, y, z;
-  };
-  std::array<Pair, std::size_t{kFirstOpenRoom} * kFirstOpenRoom> pair{};
-  const auto for_each = [&b](const auto& what) {
-    for (std::int32_t i = 0; i < 256; ++i) {
-      const std::int32_t y = i % 16, z = i / 16;
-      for (std::uint64_t bits = known_beside_open(b.rooms, y, z); bits != 0; bits &= bits - 1) {
-        const std::int32_t x = std::countr_zero(bits) / 4;
-        const unsigned room = b.rooms.at(x, y, z);
-        const auto beside = [&](std::int32_t nx, std::int32_t ny, std::int32_t nz) {
-          if (((nx | ny | nz) & ~15) != 0) return;
-          const unsigned other = b.rooms.at(nx, ny, nz);
-          if (other >= kFirstOpenRoom) what(room * kFirstOpenRoom + other - kFirstOpenRoom, x, y, z);
-        };
-        beside(x + 1, y, z), beside(x - 1, y, z), beside(x, y + 1, z), beside(x, y - 1, z),
-            beside(x, y, z + 1), beside(x, y, z - 1);
-      }
-    }
-  };
-  for_each([&pair](unsigned rooms, int x, int y, int z) {
-    Pair& p = pair[rooms];
-    ++p.count, p.x += x, p.y += y, p.z += z;
-  });
-  for (Pair& p : pair) {
-    if (p.count > 0) p.x /= p.count, p.y /= p.count, p.z /= p.count;  // their middle from now on
-  }
-  std::array<int, pair.size()> best{};
-  std::array<Door, pair.size()> door{};
-  best.fill(1 << 30);
-  for_each([&](unsigned rooms, int x, int y, int z) {
-    const Pair& p = pair[rooms];
-    const int dx = x - p.x, dy = y - p.y, dz = z - p.z;
-    const int away = dx * dx + dy * dy + dz * dz;
-    if (away >= best[rooms]) return;
-    best[rooms] = away;
-    door[rooms] = {static_cast<std::uint8_t>(rooms / kFirstOpenRoom),
-                   static_cast<std::uint8_t>(rooms % kFirstOpenRoom + kFirstOpenRoom),
-                   static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(z)};
-  });
-  for (std::size_t i = 0; i < pair.size() && b.doors[kInside] < kDoorsPerFace; ++i) {
-    if (pair[i].count > 0) b.door[kInside][b.doors[kInside]++] = door[i];
-  }
 }
 
 }  // namespace roborun::stages

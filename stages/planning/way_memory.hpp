@@ -150,8 +150,9 @@ class WayMemory final : public Ways {
   [[nodiscard]] std::uint32_t step_cost(const Cell& from, const Cell& to, double price) const noexcept;
   void wait_at(const Vector3& p_W) noexcept;
 
-  /// Of a block: the places of what surely fits inside the body.
-  [[nodiscard]] CellRows find_passable(const Cell& block, const WayCells& cells) const noexcept;
+  /// Of a block: places with room, known or not, and what was seen free where that is too narrow for it.
+  [[nodiscard]] CellRows find_passable(const Cell& block, const WayCells& cells,
+                                       const WayPlaces& places) const noexcept;
   /// kNoPath: none of what may be passable leads from one to the other, within what was seen; kInfeasible: some does;
   /// kBudgetSpent.
   [[nodiscard]] Status may_lead(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,

@@ -39,8 +39,11 @@ CellRows across(const CellRows& rows, std::size_t face) noexcept {
 
 }  // namespace
 
-CellRows WayMemory::find_passable(const Cell& block, const WayCells& cells) const noexcept {
-  CellRows passable = find_not_closed(cells, core_width_);
+CellRows WayMemory::find_passable(const Cell& block, const WayCells& cells,
+                                  const WayPlaces& places) const noexcept {
+  WayPlaces cores;
+  find_places(cells, core_width_, cores);
+  CellRows passable = cores.known;
   const std::array<std::int32_t, 3> first{kBlockCells * block.x + corner_.x,
                                           kBlockCells * block.y + corner_.y,
                                           kBlockCells * block.z + corner_.z};
@@ -67,6 +70,7 @@ CellRows WayMemory::find_passable(const Cell& block, const WayCells& cells) cons
       if (!config_.fence.allows(cube_W))
         row = static_cast<std::uint16_t>(row & ~(1U << static_cast<unsigned>(x)));
     }
+    row = static_cast<std::uint16_t>(row | places.known[i] | places.open[i]);
   }
   return passable;
 }

@@ -4,19 +4,21 @@ namespace roborun::stages {
 namespace {
 
 constexpr std::size_t kSide = std::size_t{2} * kBlockCells;
-using WideRows = std::array<std::uint32_t, kSide * kSide>;
+/// Of a row of cells the occupied ones in the lower half, those that are not free in the upper one.
+using WideRows = std::array<std::uint64_t, kSide * kSide>;
 
 /// The cells of eight blocks, as far as a vehicle of this width reaches into the others.
-void gather(const WayCells& cells, std::size_t side, bool occupied, WideRows& rows) noexcept {
+void gather(const WayCells& cells, std::size_t side, WideRows& rows) noexcept {
   for (std::size_t z = 0; z < side; ++z) {
     for (std::size_t y = 0; y < side; ++y) {
-      std::uint32_t row = 0;
+      std::uint64_t row = 0;
+      const std::size_t at = kBlockCells * (z % kBlockCells) + y % kBlockCells;
       for (unsigned x = 0; x < 2; ++x) {
         const std::size_t index = x + 2 * (y / kBlockCells) + 4 * (z / kBlockCells);
-        std::uint32_t half = !occupied && cells.content[index] == BlockContent::kFree ? 0xFFFFU : 0U;
+        std::uint64_t half = cells.content[index] == BlockContent::kFree ? 0 : std::uint64_t{0xFFFF} << 32U;
         if (cells.content[index] == BlockContent::kMixed) {
-          const std::size_t at = kBlockCells * (z % kBlockCells) + y % kBlockCells;
-          half = occupied ? cells.block[index]->occupied[at] : cells.block[index]->free[at];
+          const auto not_free = static_cast<std::uint16_t>(~cells.block[index]->free[at]);
+          half = std::uint64_t{not_free} << 32U | cells.block[index]->occupied[at];
         }
         row |= half << (16U * x);
       }
@@ -25,28 +27,45 @@ void gather(const WayCells& cells, std::size_t side, bool occupied, WideRows& ro
   }
 }
 
-/// Each cell becomes true if any of the `width` cells from it on is, along all three axes.
+/// What is true of a place of `width` by doubling: of 1, 2, 4, .. cells, and then of two such that overlap.
+template <typename Or>
+void double_up(int width, const Or& or_with) noexcept {
+  int have = 1;
+  for (; 2 * have <= width; have *= 2) or_with(have);
+  if (have < width) or_with(width - have);
+}
+
+/// Each cell becomes true if any of the `width` cells from it on is, along all three axes. What the upper half of a row
+/// shifts into the lower one is above its places.
 void spread(std::size_t side, int width, WideRows& rows) noexcept {
-  const auto many = static_cast<std::size_t>(width);
   for (std::size_t z = 0; z < side; ++z) {
-    for (std::size_t y = 0; y < side; ++y) {
-      const std::uint32_t row = rows[kSide * z + y];
-      std::uint32_t all = row;
-      for (int i = 1; i < width; ++i) all |= row >> static_cast<unsigned>(i);
-      rows[kSide * z + y] = all;
-    }
+    const auto plane = rows.begin() + static_cast<std::ptrdiff_t>(kSide * z);
+    double_up(width, [&](int by) {
+      for (std::size_t y = 0; y < side; ++y)
+        plane[static_cast<std::ptrdiff_t>(y)] |=
+            plane[static_cast<std::ptrdiff_t>(y)] >> static_cast<unsigned>(by);
+    });
+    double_up(width, [&](int by) {
+      const auto next = static_cast<std::size_t>(by);
+      for (std::size_t y = 0; y + next < side; ++y)
+        plane[static_cast<std::ptrdiff_t>(y)] |= plane[static_cast<std::ptrdiff_t>(y + next)];
+    });
   }
-  for (const std::size_t stride : {std::size_t{1}, kSide}) {
-    for (std::size_t z = 0; z < side; ++z) {
-      for (std::size_t y = 0; y < side; ++y) {
-        const std::size_t along = stride == 1 ? y : z;
-        if (along >= kBlockCells) continue;
-        std::uint32_t all = 0;
-        for (std::size_t i = 0; i < many; ++i) all |= rows[kSide * z + y + stride * i];
-        rows[kSide * z + y] = all;
-      }
+  double_up(width, [&](int by) {
+    const auto next = static_cast<std::size_t>(by);
+    for (std::size_t z = 0; z + next < side; ++z) {
+      for (std::size_t y = 0; y < kBlockCells; ++y) rows[kSide * z + y] |= rows[kSide * (z + next) + y];
     }
-  }
+  });
+}
+
+/// Bit x of a row becomes bit 4 x.
+std::uint64_t apart(std::uint16_t row) noexcept {
+  std::uint64_t bits = row;
+  bits = (bits | bits << 24U) & 0x0000'00FF'0000'00FFULL;
+  bits = (bits | bits << 12U) & 0x000F'000F'000F'000FULL;
+  bits = (bits | bits << 6U) & 0x0303'0303'0303'0303ULL;
+  return (bits | bits << 3U) & 0x1111'1111'1111'1111ULL;
 }
 
 void number(CellRows rows, unsigned first, unsigned last, WayRooms& rooms) noexcept {
@@ -64,8 +83,7 @@ void number(CellRows rows, unsigned first, unsigned last, WayRooms& rooms) noexc
     for (std::size_t i = 0; i < rows.size(); ++i) {
       if (room[i] == 0) continue;
       rows[i] = static_cast<std::uint16_t>(rows[i] & ~room[i]);
-      for (unsigned x = 0; x < kBlockCells; ++x)
-        rooms.number[i] |= (((std::uint32_t{room[i]} >> x) & 1U) != 0 ? std::uint64_t{next} : 0U) << (4U * x);
+      rooms.number[i] |= next * apart(room[i]);
     }
   }
 }
@@ -74,28 +92,15 @@ void number(CellRows rows, unsigned first, unsigned last, WayRooms& rooms) noexc
 
 void find_places(const WayCells& cells, int width, WayPlaces& places) noexcept {
   const auto side = static_cast<std::size_t>(kBlockCells + width - 1);
-  WideRows blocked{}, shut{};
-  gather(cells, side, false, blocked);
-  for (std::uint32_t& row : blocked) row = ~row;
-  gather(cells, side, true, shut);
-  spread(side, width, blocked);
-  spread(side, width, shut);
+  WideRows rows{};
+  gather(cells, side, rows);
+  spread(side, width, rows);
   for (std::size_t i = 0; i < places.known.size(); ++i) {
-    const std::size_t at = kSide * (i / kBlockCells) + i % kBlockCells;
-    places.known[i] = static_cast<std::uint16_t>(~blocked[at]);
-    places.open[i] = static_cast<std::uint16_t>(blocked[at] & ~shut[at]);
+    const std::uint64_t row = rows[kSide * (i / kBlockCells) + i % kBlockCells];
+    const std::uint64_t blocked = row >> 32U, shut = row;
+    places.known[i] = static_cast<std::uint16_t>(~blocked);
+    places.open[i] = static_cast<std::uint16_t>(blocked & ~shut);
   }
-}
-
-CellRows find_not_closed(const WayCells& cells, int width) noexcept {
-  const auto side = static_cast<std::size_t>(kBlockCells + width - 1);
-  WideRows shut{};
-  gather(cells, side, true, shut);
-  spread(side, width, shut);
-  CellRows rows{};
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    rows[i] = static_cast<std::uint16_t>(~shut[kSide * (i / kBlockCells) + i % kBlockCells]);
-  return rows;
 }
 
 void flood(const CellRows& rows, CellRows& room) noexcept {
@@ -113,11 +118,14 @@ void flood(const CellRows& rows, CellRows& room) noexcept {
     if (i % kBlockCells < kBlockCells - 1) near |= room[i + 1];
     if (i >= kBlockCells) near |= room[i - kBlockCells];
     if (i + kBlockCells < room.size()) near |= room[i + kBlockCells];
+    if ((near & rows[i]) == room[i]) return false;  // all along x is in it
     const std::uint16_t grown = along_x(near & rows[i], rows[i]);
     const bool more = grown != room[i];
     room[i] = grown;
     return more;
   };
+  for (std::size_t i = 0; i < room.size(); ++i)
+    if (room[i] != 0) room[i] = along_x(room[i] & rows[i], rows[i]);
   // Each round there and back reaches at least one place more: a room has at most 4,096.
   for (int round = 0; round < 4096; ++round) {
     bool more = false;

@@ -36,8 +36,6 @@ struct WayPlaces {
   CellRows known{}, open{};
 };
 void find_places(const WayCells& cells, int width, WayPlaces& places) noexcept;
-/// Those that are known or open.
-[[nodiscard]] CellRows find_not_closed(const WayCells& cells, int width) noexcept;
 /// All places that are connected with those of `room`, of those in `rows`. RT-safe: O(256 * 16) rounds.
 void flood(const CellRows& rows, CellRows& room) noexcept;
 /// Numbers the rooms. RT-safe: O(rooms * 256 * 16).

@@ -127,18 +127,19 @@ TEST_F(WayMemoryTest, AGapThatMayBeWideEnoughProvesNothing) {
   EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath);
 }
 
-TEST_F(WayMemoryTest, AHoleThatNothingWasSeenInProvesNothing) {
-  // Too narrow for any room, but nobody has seen what is there.
-  config_.radius_m = 0.55;
-  config_.body_m = 0.45;
+TEST_F(WayMemoryTest, AHoleInAWallIsNoWayWhereNoRoomFitsAndNothingWasSeenBehindIt) {
+  // 1.2 m of a wall that were not seen: no place of the vehicle, which is 1.8 m wide.
+  config_.body_m = 0.6;
   box(-15, 20, 20.6, 20.6);
   box(-15, -20.6, 20.6, -20);
   box(-15.6, -21, -15, 21);
-  box(20, -21, 20.6, -0.2);
-  box(20, 0.2, 20.6, 21);
-  view_.free_W.max_W.x() = 20.3;
+  box(20, -21, 20.6, -0.6);
+  box(20, 0.6, 20.6, 21);
+  view_.free_W.max_W.x() = 20.0;
   make();
-  EXPECT_EQ(look_and_solve(start_W_), Status::kInfeasible);
+  EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath);
+  view_.free_W.max_W.x() = 25.0;
+  EXPECT_EQ(look_and_solve(start_W_), Status::kInfeasible) << "seen to be open";
 }
 
 TEST_F(WayMemoryTest, AFenceThatClosesEverythingIsAProof) {
