@@ -18,6 +18,8 @@ constexpr double kCornerRoom_m = 0.25;
 constexpr double kAtRest_mps = 0.05;
 constexpr double kLeaving_mps = 0.5;
 constexpr double kTooFast = 1.5;
+constexpr double kReserve = 1.25;  // of the time for planner and smoother, see hasten()
+constexpr int kSpareFrames = 4;
 constexpr double kSlowEnough = 1.05;  // of the slow speed: what trajectories keep to
 /// What the way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
 constexpr double kBeyond_mps = 2.0;
@@ -271,8 +273,20 @@ void DecisionPipeline::leave(core::StageBudget& budget, DecisionOutput& out) noe
   out.smoother_status = draft_.leaves ? Status::kOk : Status::kNoPath;
 }
 
+void DecisionPipeline::hasten(const DecisionInput& in, DecisionOutput& out) const noexcept {
+  if (in.climbing || out.decision.source == governor::BudgetSource::kFixed) return;
+  const double left_s =
+      out.decision.predicted_s[core::StageId::kPlanner] + out.decision.predicted_s[core::StageId::kSmoother];
+  const Nanos needed = out.latency + from_seconds(kReserve * left_s);
+  const Nanos whole = config_.minor_frame * (needed / config_.minor_frame + kSpareFrames);
+  const MonotonicTime stands = in.committed->start_time + from_seconds(in.committed->duration_s());
+  if (in.now + whole < stands) return;
+  out.decision.point.deadline = std::min(out.decision.point.deadline, whole);
+}
+
 void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexcept {
   draft_.begun = false;
+  hasten(in, out);
   draft_.takes_over = in.now + out.decision.point.deadline;
   const MonotonicTime ends = in.committed->start_time + from_seconds(in.committed->duration_s());
   if (in.climbing && draft_.takes_over < ends) return;

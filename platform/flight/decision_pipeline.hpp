@@ -146,6 +146,9 @@ class DecisionPipeline {
                                                       const stages::MapView& known, core::Work& work,
                                                       Nanos latency) const noexcept;
   void export_map(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// Where the vehicle stands by then, a decision need not last as long as was expected once the map is done: of what is in view holes are a part, of
+  /// which nobody knows beforehand how much of it the map can take. Brings the deadline forward.
+  void hasten(const DecisionInput& in, DecisionOutput& out) const noexcept;
   void plan(const DecisionInput& in, DecisionOutput& out) noexcept;
   void smooth(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// What is known of the ways, from here.

@@ -289,7 +289,8 @@ void DecisionProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
   if (slot == SlotId::kSmoother) judge();
   if (slot == SlotId::kGovernor || slot == SlotId::kSmoother)
     publish(lane.release() + out_.decision.point.deadline);
-  if (slot == SlotId::kGovernor) lane.set_period(out_.decision.point.deadline);
+  // The planner may find that less is left to do than was expected.
+  if (slot == SlotId::kGovernor || slot == SlotId::kSmoother) lane.set_period(out_.decision.point.deadline);
 }
 
 }  // namespace roborun::flight

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <set>
 #include <string_view>
 
@@ -38,6 +39,38 @@ std::set<std::string_view> tables() {
 }
 
 constexpr const char* kSix = "-six";
+
+/// A shipped vehicle, as it is or with other cameras.
+struct Variant {
+  const ShippedVehicle* shipped{};
+  bool six{};
+  std::optional<CameraModel> model{};
+};
+
+/// NAME, NAME-six, NAME-MODEL, NAME-six-MODEL; none for any other name.
+std::optional<Variant> variant_of(std::string_view name) {
+  for (const ShippedVehicle& v : kShippedVehicles) {
+    if (!name.starts_with(v.name)) continue;
+    std::string_view rest = name.substr(std::string_view(v.name).size());
+    Variant variant{&v};
+    variant.six = rest.starts_with(kSix);
+    if (variant.six) rest.remove_prefix(std::string_view(kSix).size());
+    if (rest.empty()) return variant;
+    if (rest.front() != '-') continue;
+    variant.model = model_of<CameraModel>(rest.substr(1));
+    if (variant.model && variant.model != CameraModel::kClean) return variant;
+  }
+  return std::nullopt;
+}
+
+/// With the errors of that product; optics and range stay.
+void see_as(Vehicle& vehicle, CameraModel model) {
+  const std::string name = fmt::format("-{}", to_string(model));
+  vehicle.name += name;
+  vehicle.digest += name;
+  vehicle.about += fmt::format("; with the errors of {} cameras", to_string(model));
+  for (CameraSpec& camera : vehicle.rig.cameras) camera.model = model;
+}
 
 /// Six cameras with the range, rate and latency of its first, which see everything around it.
 void see_all_round(Vehicle& vehicle) {
@@ -224,11 +257,7 @@ Vehicle vehicle_from_toml(const std::string& path, const std::string& text) {
   return vehicle;
 }
 
-bool ships(const std::string& name) {
-  return std::any_of(kShippedVehicles.begin(), kShippedVehicles.end(), [&name](const ShippedVehicle& v) {
-    return name == v.name || name == v.name + std::string(kSix);
-  });
-}
+bool ships(const std::string& name) { return variant_of(name).has_value(); }
 
 std::vector<std::string> shipped_vehicles() {
   std::vector<std::string> names;
@@ -238,14 +267,13 @@ std::vector<std::string> shipped_vehicles() {
 }
 
 Vehicle load_vehicle(const std::string& name_or_path) {
-  for (const ShippedVehicle& v : kShippedVehicles) {
-    const bool six = name_or_path == v.name + std::string(kSix);
-    if (!six && name_or_path != v.name) continue;
-    Vehicle vehicle = vehicle_from_toml(v.name, v.text);
-    if (!six) return vehicle;
-    if (vehicle.rig.cameras.empty())
-      throw InputError(fmt::format("{}: {} has no camera: must be a vehicle with one", name_or_path, v.name));
-    see_all_round(vehicle);
+  if (const std::optional<Variant> variant = variant_of(name_or_path)) {
+    Vehicle vehicle = vehicle_from_toml(variant->shipped->name, variant->shipped->text);
+    if ((variant->six || variant->model) && vehicle.rig.cameras.empty())
+      throw InputError(fmt::format("{}: {} has no camera: must be a vehicle with one", name_or_path,
+                                   variant->shipped->name));
+    if (variant->six) see_all_round(vehicle);
+    if (variant->model) see_as(vehicle, *variant->model);
     return vehicle;
   }
   return vehicle_from_toml(name_or_path,

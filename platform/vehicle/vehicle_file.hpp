@@ -29,7 +29,8 @@ struct Vehicle {
 /// that cannot fly.
 [[nodiscard]] Vehicle vehicle_from_toml(const std::string& path, const std::string& text);
 /// A shipped vehicle by its name, or one of a file. NAME-six is a shipped vehicle that has six cameras of 90 x 90 degrees
-/// and 96 x 96 pixels all round in the place of its sensors, which else are as its first camera. Throws InputError.
+/// and 96 x 96 pixels all round in the place of its sensors, which else are as its first camera. NAME-MODEL, with
+/// a model besides clean of core/sensor_model.hpp (paper-d455), is one whose cameras have that product's errors; NAME-six-MODEL both. Throws InputError.
 [[nodiscard]] Vehicle load_vehicle(const std::string& name_or_path);
 /// True if load_vehicle takes it from the program, not from a file.
 [[nodiscard]] bool ships(const std::string& name);

@@ -61,6 +61,24 @@ TEST(VehicleFile, WithSixItSeesAllRoundAsFarAsItsFirstCamera) {
   EXPECT_THROW((void)load_vehicle("racer-six"), InputError);
 }
 
+TEST(VehicleFile, WithAModelItsCamerasErrAsThatProductDoes) {
+  const Vehicle clean = load_vehicle("paper");
+  const Vehicle d455 = load_vehicle("paper-d455");
+  ASSERT_EQ(d455.rig.cameras.size(), 6U);
+  for (const CameraSpec& camera : d455.rig.cameras) {
+    EXPECT_EQ(camera.model, CameraModel::kD455);
+    EXPECT_EQ(camera.range_m, clean.rig.cameras[0].range_m);
+  }
+  EXPECT_EQ(d455.name, "paper-d455");
+  EXPECT_NE(d455.digest, clean.digest);
+  EXPECT_EQ(load_vehicle("x500-six-oak-d").rig.cameras.size(), 6U);
+  EXPECT_EQ(load_vehicle("x500-six-oak-d").rig.cameras[5].model, CameraModel::kOakD);
+  EXPECT_TRUE(ships("paper-tof"));
+  for (const char* name : {"paper-clean", "paper-", "paper-d999", "paperd455", "paper-d455-six"})
+    EXPECT_FALSE(ships(name)) << name;
+  EXPECT_THROW((void)load_vehicle("racer-d455"), InputError);
+}
+
 constexpr const char* kCamera = R"(
 [[camera]]
 width = 640
