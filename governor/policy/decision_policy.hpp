@@ -22,6 +22,7 @@ struct Situation {
   double distance_to_goal_m{};
   bool surveying{};  ///< The flight goes on to its hover whatever comes of this decision.
   bool motion{};     ///< Something moves nearby.
+  bool thin{};       ///< Something thin stands or hangs nearby, and more may that is thinner.
   bool narrow{};     ///< What is flown was planned with the room of slow flight.
 };
 

@@ -79,7 +79,7 @@ Status Policy::validate() const noexcept {
   const bool volume_ok = core::above(planner_share, 0.0, 1.0);
   const bool speed_ok = core::within(near_goal_m, 0.0, 1000.0) &&
                         core::above(near_goal_speed_mps, 0.0, 30.0) &&
-                        core::above(motion_speed_mps, 0.0, 30.0);
+                        core::above(motion_speed_mps, 0.0, 30.0) && core::above(thin_speed_mps, 0.0, 30.0);
   const bool ok = times_ok && precision_ok && volume_ok && speed_ok &&
                   core::within(decisions_per_budget, 1.0, 10.0) && core::within(reserve_ratio, 0.0, 0.5);
   return ok ? Status::kOk : Status::kInvalidArgument;
@@ -91,8 +91,8 @@ Status GovernorConfig::validate() const noexcept {
   for (const double fixed_s : {point_cloud_s, governor_s, smoother_s})
     ok = ok && core::within(fixed_s, 0.0, 1e6);
   ok = ok && core::above(v_max_mps, 0.0, 30.0) && core::above(vehicle_width_m, 0.0, 20.0) &&
-       core::above(sensor_volume_max_m3, 0.0, 1e9) && core::within(lattice.finest_m, 0.05, 0.3) &&
-       core::within(coarsest_level, 0, kPrecisionLevels - 1) &&
+       core::above(thin_step_m, 0.0, 1e3) && core::above(sensor_volume_max_m3, 0.0, 1e9) &&
+       core::within(lattice.finest_m, 0.05, 0.3) && core::within(coarsest_level, 0, kPrecisionLevels - 1) &&
        core::above(design_visibility_m, 0.0, 1000.0) && minor_frame > Nanos{0};
   return ok ? Status::kOk : Status::kInvalidArgument;
 }
@@ -288,11 +288,14 @@ SolverProblem Governor::problem_of(const Task& task, const Precision& precision,
 }
 
 /// Step 6: how fast may the next trajectory be? As fast as it can still stop inside known free space, which
-/// the smoother sees to.
-double Governor::speed_limit_mps(const Situation& situation) const noexcept {
+/// the smoother sees to. Among thin things no farther from one decision's images to the next one's than thin_step_m.
+double Governor::speed_limit_mps(const Situation& situation, double deadline_s) const noexcept {
   double speed_mps = v_max_mps_;
   if (near_goal(situation)) speed_mps = std::min(speed_mps, config_.policy.near_goal_speed_mps);
   if (situation.motion) speed_mps = std::min(speed_mps, config_.policy.motion_speed_mps);
+  if (situation.thin)
+    speed_mps =
+        std::min(speed_mps, std::max(config_.thin_step_m / deadline_s, config_.policy.thin_speed_mps));
   return speed_mps;
 }
 
@@ -321,8 +324,13 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
     time_s =
         std::max(time_s, sum(d.predicted_s) * (1.0 + policy.reserve_ratio) + seconds(config_.minor_frame));
   }
-  d.point = {d.solution.p0_level, d.solution.p1_level,  d.solution.v0_m3,          d.solution.v1_m3,
-             d.solution.v2_m3,    whole_frames(time_s), speed_limit_mps(situation)};
+  d.point = {d.solution.p0_level,
+             d.solution.p1_level,
+             d.solution.v0_m3,
+             d.solution.v1_m3,
+             d.solution.v2_m3,
+             whole_frames(time_s),
+             speed_limit_mps(situation, time_s)};
   return d;
 }
 

@@ -189,8 +189,9 @@ class DecisionPipeline {
   MonotonicTime leaves_at_ =
       MonotonicTime::min();  ///< Start of the last trajectory that leaves a place without room.
   Draft draft_;
-  bool is_narrow_{false};  ///< What is flown was planned so.
-  int failures_{0};        ///< Decisions in a row without a trajectory.
+  MonotonicTime thin_until_{};  ///< Something thin was seen less than kThinLasts before.
+  bool is_narrow_{false};       ///< What is flown was planned so.
+  int failures_{0};             ///< Decisions in a row without a trajectory.
 };
 
 }  // namespace roborun::flight

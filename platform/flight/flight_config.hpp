@@ -37,6 +37,8 @@ struct FlightConfig {
   bool sees_all_around{true};  ///< The cameras together, a sky too; false: what is not seen may be anything.
   double level_view_ratio{1.0};  ///< Tangent of the elevation, up and down, that one turn sees.
   double too_near_m{};  ///< Half of the cube around the vehicle that may be too near for its sensors.
+  /// Of the coarsest camera (without any: of the images of a cloud), per unit of the tangent; 0: no sensor. [0, 1e4]
+  double pixels_per_tan{};
   GazeConfig gaze{};
   std::array<DepthError, kMostCameras>
       depth_error{};  ///< Of each camera: the map keeps this away from what it saw.

@@ -249,7 +249,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   std::uint64_t known_cells_{0};
   std::int32_t free_now_{kFreeBrick};  ///< A slot that is free and was seen past as a whole in this scan.
   Vector3 vehicle_W_ = Vector3::Zero();
-  double thin_reach_m_{0.0};  ///< Of this scan: counts_for_the_thin().
+  std::uint32_t thin_seen_{0};  ///< Pixels of this scan that showed something thin.
+  double thin_reach_m_{0.0};    ///< Of this scan: counts_for_the_thin().
   int view_level_{0};
   double view_radius_m_{0.0};  ///< Bricks whose centre is farther from view_center_W_ are unknown.
   Vector3 view_center_W_ = Vector3::Zero();

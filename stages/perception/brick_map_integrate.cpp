@@ -317,6 +317,7 @@ Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget&
     for (std::size_t i = 0; i < dirty_count_; ++i) refresh(brick_[dirty_[i]]);  // add_tiles() reads mips
   add_surfaces(request, result.work);
   refresh_dirty();
+  result.thin_pixels = thin_seen_;
   return done < count ? Status::kBudgetSpent : Status::kOk;
 }
 

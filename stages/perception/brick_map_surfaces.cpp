@@ -104,6 +104,7 @@ void BrickMap::add_thin_pixels(const SurfaceCamera& camera, const PixelLine& lin
       if (!cell_of(p_W, cell) || moved_nearby(camera.moved_W, p_W)) continue;
       const std::int32_t bx = cell.x >> kBrickLevel, by = cell.y >> kBrickLevel, bz = cell.z >> kBrickLevel;
       if (!paid(bx, by, bz)) continue;
+      thin_seen_ += static_cast<std::uint32_t>((pixels_.surely_thin[word] >> (u % 64)) & 1U);
       if (Brick* brick = surface_brick(bx, by, bz, camera.is_coarse()))
         brick->add_thin(morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z)));
     }
@@ -196,6 +197,7 @@ void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image,
 }
 
 void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work) noexcept {
+  thin_seen_ = 0;
   for (std::size_t i = 0; i < cameras_.count; ++i) {
     SurfaceCamera camera;
     camera.posed = &request.frames[frame_of_[i]];

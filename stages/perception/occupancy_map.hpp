@@ -40,6 +40,7 @@ struct IntegrationRequest {
 struct IntegrationResult {
   core::Work work{};               ///< units: cells and nodes visited; volume_m3: space updated.
   std::uint32_t frames_refused{};  ///< Not used at all: check_frame(), and in the own map FrameGuard.
+  std::uint32_t thin_pixels{};     ///< That showed something thin nearby; of other maps than the own one 0.
 };
 
 struct ExportRequest {

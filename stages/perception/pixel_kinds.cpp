@@ -63,6 +63,7 @@ void tell_pixels_lanes(const firmware_if::DepthFrame& frame, std::size_t v, std:
   load_rows(frame, v, u0, u1, rows);
   row.any_thin = false;
   row.thin.fill(0);
+  row.surely_thin.fill(0);
   for (std::size_t u = 0; u < count; u += lanes) {
     const float* const here = rows.row[1] + ThreeRows::kBefore + u;
     const float* const above = rows.row[0] + ThreeRows::kBefore + u;
@@ -103,6 +104,9 @@ void tell_pixels_lanes(const firmware_if::DepthFrame& frame, std::size_t v, std:
     const std::uint64_t bits = bits_of(thin);
     row.any_thin = row.any_thin || bits != 0;
     row.thin[u / 64] |= bits << (u % 64);
+    const auto between = [&](auto a, auto b) { return hn::And(farther(a), farther(b)); };
+    const std::uint64_t sure = bits_of(hn::And(thin, hn::Or(between(left, right), between(up, down))));
+    row.surely_thin[u / 64] |= sure << (u % 64);
   }
 }
 

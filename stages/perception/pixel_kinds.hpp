@@ -26,6 +26,8 @@ struct PixelRow {
   /// no information.) Of a camera that mixes it must not be alone, nor beside one that is nearer: such pixels lie anywhere
   /// between what is in front and what is behind.
   std::array<std::uint64_t, kMaxImageSide / 64 + 1> thin{};
+  /// Of these, pixels of which both neighbours are known to be farther.
+  std::array<std::uint64_t, kMaxImageSide / 64 + 1> surely_thin{};
   bool any_thin{};
 };
 

@@ -25,6 +25,8 @@ TEST(GovernorConfigDeathTest, OnlyValidOnesAreMade) {
        {"near goal", [](Config& c) { c.policy.near_goal_m = kNan; }},
        {"near goal speed", [](Config& c) { c.policy.near_goal_speed_mps = 0.0; }},
        {"motion speed", [](Config& c) { c.policy.motion_speed_mps = -1.0; }},
+       {"thin speed", [](Config& c) { c.policy.thin_speed_mps = 0.0; }},
+       {"thin step", [](Config& c) { c.thin_step_m = kNan; }},
        {"reserve", [](Config& c) { c.policy.reserve_ratio = 1.0; }},
        {"stopping", [](Config& c) { c.stopping.quadratic_s2pm = -0.1; }},
        {"model", [](Config& c) { c.model[Knob::kPlan].slope_s_per_m3[2] = kNan; }},

@@ -120,6 +120,24 @@ TEST(Governor, LosesPrecisionOneLevelADecision) {
   EXPECT_GE(last, 2);
 }
 
+/// From one decision's images to the next one's no farther than the thinnest thing allows, but not slower than a crawl.
+TEST(Governor, AmongThinThingsSpeedFollowsTheTimeBetweenTwoLooks) {
+  GovernorConfig config = paper_config(Design::kAware);
+  config.thin_step_m = 1.5;
+  Governor sut(config);
+  Situation situation{0, 100.0};
+  const SpaceProfile p = open_space(20.0, 2.0);
+  const double free_mps = sut.decide(p, situation).point.speed_limit_mps;
+  situation.thin = true;
+  const Decision thin = sut.decide(p, situation);
+  EXPECT_LT(thin.point.speed_limit_mps, 0.5 * free_mps);
+  EXPECT_NEAR(thin.point.speed_limit_mps * seconds(thin.point.deadline), 1.5, 0.02);
+  config.thin_step_m = 1e-3;
+  EXPECT_EQ(Governor(config).decide(p, situation).point.speed_limit_mps, config.policy.thin_speed_mps);
+  config.design = Design::kStatic;
+  EXPECT_EQ(Governor(config).decide(p, situation).point.speed_limit_mps, 0.5) << "the published design";
+}
+
 TEST(Governor, TimeWinsOverPrecisionAtSpeed) {
   Governor sut(paper_config(Design::kAware));
   SpaceProfile p = open_space(8.0, 6.0);

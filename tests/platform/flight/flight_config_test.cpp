@@ -34,6 +34,19 @@ TEST(FlightConfig, IsRefusedWhereANumberCannotBe) {
   EXPECT_TRUE(refused([](FlightConfig& c) { c.minor_frame = Nanos{0}; }));
   EXPECT_TRUE(refused([](FlightConfig& c) { c.minor_frame = Nanos{1}; }));
   EXPECT_TRUE(refused([](FlightConfig& c) { c.gaze.yaw_rate_radps = 0.0; }));
+  EXPECT_TRUE(refused([](FlightConfig& c) { c.pixels_per_tan = kNaN; }));
+}
+
+/// 2 cm are a pixel of the coarsest camera (48 pixels per unit of the tangent) at 0.96 m: a quarter of that from look to look.
+TEST(FlightConfig, TheCoarsestCameraSaysHowDenselyThinThingsAreLookedFor) {
+  FlightConfig config = sound();
+  EXPECT_EQ(governor_config(config).thin_step_m, governor::GovernorConfig{}.thin_step_m) << "no camera";
+  SensorRig rig = six_cameras(96, 25.0);
+  rig.cameras[2].width = rig.cameras[2].height = 480;
+  describe_sensors(rig, config);
+  EXPECT_DOUBLE_EQ(governor_config(config).thin_step_m, 0.24);
+  config.vehicle.thinnest_m = 0.1;
+  EXPECT_DOUBLE_EQ(governor_config(config).thin_step_m, 1.2);
 }
 
 TEST(FlightConfig, WhatIsTooNearForAllSensorsIsTakenToBeFreeAroundTheTopOfTheClimb) {

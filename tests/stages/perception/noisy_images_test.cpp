@@ -47,6 +47,7 @@ class NoisyImages : public ::testing::Test {
     IntegrationResult result;
     ASSERT_EQ(sut_->integrate({frames, level, kInfinity, here}, unlimited_, result), Status::kOk);
     ASSERT_EQ(result.frames_refused, 0U);
+    thin_pixels_ = result.thin_pixels;
     core::Work work;
     (void)sut_->export_view({0, kInfinity, at_}, unlimited_, work);
   }
@@ -69,6 +70,7 @@ class NoisyImages : public ::testing::Test {
   core::UnlimitedBudget unlimited_;
   std::uint64_t lookups_{0};
   int scans_{0};
+  std::uint32_t thin_pixels_{0};  ///< Of the last scan.
 };
 
 /// The whole sphere has a tenth of its pixels lost at random: nearly as much is free after two scans as of whole images.
@@ -287,12 +289,14 @@ TEST_F(NoisyImages, APoleSeenOnceIsKept) {
   const Aabb pole{Vector3(3.0, 1.05, 4.05), Vector3(3.0, 1.05, 6.0)};
   see([](auto&) {});
   ASSERT_EQ(count(pole, CellState::kOccupied), 7);
+  EXPECT_GT(thin_pixels_, 20U);
   const test::Scene seen = scene_;
   int least = 7;
   for (int n = 1; n <= 200; ++n) {
     scene_ = n % 10 == 0 ? seen : missed;
     see([](auto&) {});
     least = std::min(least, count(pole, CellState::kOccupied));
+    EXPECT_EQ(thin_pixels_ > 0, n % 10 == 0) << n;
   }
   EXPECT_EQ(least, 7);
   // But not for ever: one that was taken away is free after some hundred looks that could have met it.
@@ -330,6 +334,7 @@ TEST(PixelKinds, KnowsMixedAndThinOnes) {
       EXPECT_EQ(row.depth_m[u], is_lost ? 0.0F : at(u, v)) << u << ", " << v;
       EXPECT_EQ((row.thin[0] >> u) & 1U, u == 4 || (u == 19 && v == 8) ? 1U : 0U) << u << ", " << v;
     }
+    EXPECT_EQ((row.surely_thin[0] >> 4U) & 1U, v == 2 ? 0U : 1U) << "nobody knows what is beside it";
     // A part of a row is told as it is in the whole.
     const PixelRow whole = row;
     tell_pixels(frame, v, 4, 17, {0.3F, 0.0F, true}, row);
