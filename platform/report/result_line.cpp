@@ -50,6 +50,7 @@ std::optional<MissionResult> from_line(const std::string& line) {
     r.state_hash = json.at("state_hash");
     r.map = json.at("map");
     r.planner = json.at("planner");
+    r.ways = json.value("ways", "own");  // results of before have none
     r.mission = json.at("mission");
     r.reason = json.at("reason");
     r.speed_limit_mps = number(json.at("speed_limit_mps"));
