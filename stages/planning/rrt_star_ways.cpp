@@ -14,7 +14,7 @@ constexpr int kChained = 12;         // searches between corners
 constexpr int kSampled = 4;          // searches of the whole way
 constexpr double kAround_m = 2.5;    // between two corners a way bends no farther than that
 constexpr double kApart_m = 0.01;
-constexpr int kTries = 40;  // of shortening
+constexpr int kShortenings = 40;  // of shortening
 
 }  // namespace
 
@@ -42,7 +42,8 @@ bool RrtStar::follow_ways(Search& s, const MapView& map, double below_m, PlanRes
       (void)tighten(to_it, found);
     } else {
       found.path_W = chain(to_it, std::span(way_W).first(i + 1));
-      found.cost_m = shorten(s.view, request.radius_m, reach_m, kTries, s.rng, found.path_W, s.work.units);
+      found.cost_m =
+          shorten(s.view, request.radius_m, reach_m, kShortenings, s.rng, found.path_W, s.work.units);
       rounds = kSampled;
     }
     if (found.path_W.size() < 2 || found.cost_m < kShortest_m || !pays(found.path_W.back(), found.cost_m))

@@ -62,6 +62,9 @@ class WayMemory final : public Ways {
     std::uint8_t x{}, y{}, z{};  ///< A place of `room` beside it.
   };
   static constexpr std::size_t kFaces = 6, kInside = 6;
+  /// From a block to the one beyond a face.
+  static constexpr std::array<Cell, kFaces> kStep{
+      {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
   static constexpr std::size_t kDoorsPerFace = 6;
   struct Block {
     WayRooms rooms{};

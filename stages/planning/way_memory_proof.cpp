@@ -10,8 +10,6 @@ constexpr std::uint32_t kVisitsPerPoll = 16;
 constexpr std::uint32_t kMostVisits = 1U << 20U;
 constexpr std::int32_t kNear = 2;  // cells: what counts as the goal's
 constexpr std::size_t kRow = kBlockCells;
-constexpr std::array<std::array<std::int32_t, 3>, 6> kStep{
-    {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
 
 bool any(const CellRows& rows) noexcept {
   std::uint16_t all = 0;
@@ -113,7 +111,7 @@ void WayMemory::pass_on(const Cell& block, const Cell& goal) noexcept {
     all = b.passed;
   }
   for (std::size_t face = 0; face < kFaces; ++face) {
-    const Cell next{block.x + kStep[face][0], block.y + kStep[face][1], block.z + kStep[face][2]};
+    const Cell next{block.x + kStep[face].x, block.y + kStep[face].y, block.z + kStep[face].z};
     if (in_search(next)) pass_into(next, across(all, face), goal);
   }
 }

@@ -12,8 +12,6 @@ constexpr double kCost_m = 0.01;  // of costs
 constexpr std::uint32_t kNodesPerPoll = 256;
 constexpr double kWaits = 16.0;          // after so many what is unknown costs twice as much
 constexpr std::uint32_t kBeyond = 3000;  // units of cost that the search runs on beyond the vehicle
-constexpr std::array<std::array<std::int32_t, 3>, 6> kStep{
-    {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
 
 }  // namespace
 
@@ -42,7 +40,7 @@ void WayMemory::relax_uniform(std::uint32_t node, const Cell& block, unsigned ro
   const Node& n = node_[node];
   const double metre = price(node, room);
   for (std::size_t face = 0; face < kFaces; ++face) {
-    const Cell next{block.x + kStep[face][0], block.y + kStep[face][1], block.z + kStep[face][2]};
+    const Cell next{block.x + kStep[face].x, block.y + kStep[face].y, block.z + kStep[face].z};
     if (!in_search(next)) continue;
     const std::uint32_t position = position_of(next);
     const std::int32_t kind = kind_at(position);
@@ -74,12 +72,12 @@ void WayMemory::relax_rooms(std::uint32_t node, const Block& b, unsigned room) n
   const Cell corner{kBlockCells * block.x, kBlockCells * block.y, kBlockCells * block.z};
   for (std::size_t face = 0; face < kFaces; ++face) {
     const auto& by = kStep[face];
-    const Cell next{block.x + by[0], block.y + by[1], block.z + by[2]};
+    const Cell next{block.x + by.x, block.y + by.y, block.z + by.z};
     if (!in_search(next)) continue;
     for (std::size_t i = 0; i < b.doors[face]; ++i) {
       const Door& d = b.door[face][i];
       if (d.room != room) continue;
-      const Cell door{corner.x + d.x + by[0], corner.y + d.y + by[1], corner.z + d.z + by[2]};
+      const Cell door{corner.x + d.x + by.x, corner.y + d.y + by.y, corner.z + d.z + by.z};
       reach(node_of(position_of(next), d.other), n.cost + step_cost(n.entry, door, metre), node, door);
     }
   }
