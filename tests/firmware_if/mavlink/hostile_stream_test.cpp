@@ -64,7 +64,7 @@ class Model {
     std::uint16_t crc = 0xffff;
     const auto add = [&crc](std::uint8_t byte) {
       for (unsigned bit = 0; bit < 8; ++bit) {
-        const bool out = ((crc ^ (byte >> bit)) & 1U) != 0;
+        const bool out = ((crc ^ (unsigned{byte} >> bit)) & 1U) != 0;
         crc = static_cast<std::uint16_t>((crc >> 1U) ^ (out ? 0x8408U : 0U));
       }
     };
