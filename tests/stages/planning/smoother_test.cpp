@@ -171,8 +171,8 @@ TEST(Smoother, KeepsThePointsThatANarrowPathNeeds) {
                    {Vector3(-5, -9, -9), Vector3(2.35, -0.35, 9)},
                    {Vector3(2.35, -9, -9), Vector3(9, -0.15, 9)},
                    {Vector3(1.65, 0.55, -9), Vector3(9, 9, 9)}};
-  SmoothRequest request =
-      request_of({Vector3::Zero(), Vector3(2, 0, 0), Vector3(2, 0.2, 0), Vector3(5, 0.2, 0)});
+  const std::vector<Vector3> path{Vector3::Zero(), Vector3(2, 0, 0), Vector3(2, 0.2, 0), Vector3(5, 0.2, 0)};
+  SmoothRequest request = request_of(path);
   request.radius_m = 0.3;
   Smoother sut;
   core::UnlimitedBudget unlimited;
