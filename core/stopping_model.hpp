@@ -25,10 +25,9 @@ struct StoppingModel {
 /// (5.834, 3.539) (7.712, 5.985) (9.563, 8.151). Relative mean squared error 1.65 %.
 inline constexpr StoppingModel kRoborunStopping{0.05494, 0.3549, -0.2038};
 
-/// The quadrotor of platform/sitl on a minimum-snap stop with 4 m/s2 at its peak, as trajectories end, wind
-/// and tracking error included: measured 0.109, 0.304, 1.110, 2.465, 4.342, 6.714, 9.619 m from 0.5, 1, 2, 3,
-/// 4, 5, 6 m/s; rounded upwards. When the way is blocked it brakes harder: 0.144, 0.274, 0.767, 1.511, 2.512,
-/// 3.772, 5.284 m (tests/platform/sitl/vehicle/stopping_test.cpp).
-inline constexpr StoppingModel kSitlQuadrotorStopping{0.262, 0.03, 0.15};
+/// The quadrotor of platform/sitl on a stop with 4 m/s2 and 15 m/s3, as trajectories end, wind and tracking error
+/// included: measured 0.166, 0.313, 0.835, 1.612, 2.639, 3.917, 5.445 m from 0.5, 1, 2, 3, 4, 5, 6 m/s
+/// (tests/platform/sitl/vehicle/stopping_test.cpp); rounded upwards.
+inline constexpr StoppingModel kSitlQuadrotorStopping{0.127, 0.18, 0.14};
 
 }  // namespace roborun

@@ -36,7 +36,7 @@ struct PolynomialSegment {
   }
 };
 
-/// Piecewise polynomial, continuous up to snap, at rest at its end. Before start_time it stays at its first
+/// Piecewise polynomial, continuous up to acceleration, at rest at its end. Before start_time it stays at its first
 /// point, after its end at its last point, in both cases with all derivatives zero. Empty (segment_count ==
 /// 0): "hold" at hold_W.
 class Trajectory {

@@ -1,20 +1,45 @@
 #include "core/vehicle_model.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/geometry/math.hpp"
 
 namespace roborun {
 namespace {
 
-constexpr double kStopShape = 35.0 / 32.0;  // of a minimum-snap stop, in v^2/a
-constexpr double kJerkShape = 0.4293;       // of what the jerk limit adds at most, in a/j v
 constexpr double kLeastThrust_ratio = 1.2;  // below it there is no thrust left to tilt with in wind
+constexpr double kLeastBraking_mps2 = 0.2;
+
+constexpr double kUsable = 0.8;
+
+/// Of the acceleration at the tilt limit, what is left along the motion, against drag.
+double left_mps2(const VehicleModel& v, double speed_mps) noexcept {
+  return kUsable * (tilt_acceleration_mps2(v) - drag_mps2(v, speed_mps));
+}
+
+/// The same across the motion. Drag has no part in it, and brakes with it.
+double across_mps2(const VehicleModel& v) noexcept {
+  const double tilt_mps2 = tilt_acceleration_mps2(v), drag = drag_mps2(v, v.speed_mps);
+  return kUsable * std::sqrt(std::max(tilt_mps2 * tilt_mps2 - drag * drag, 0.0));
+}
 
 }  // namespace
 
+FollowedLimits followed_limits(const VehicleModel& v) noexcept {
+  constexpr double kBeside = 0.5;
+  return {std::clamp(across_mps2(v), kLeastBraking_mps2, v.acceleration_mps2),
+          std::min(v.jerk_mps3, v.tracking_error_m / (kBeside * v.motor_lag_s))};
+}
+
+double speeding_up_mps2(const VehicleModel& v, double speed_mps) noexcept {
+  return std::clamp(left_mps2(v, speed_mps), kLeastBraking_mps2, v.acceleration_mps2);
+}
+
 StoppingModel stopping_model(const VehicleModel& v) noexcept {
   if (v.measured_stopping) return *v.measured_stopping;
-  return {kStopShape / v.acceleration_mps2, kJerkShape * v.acceleration_mps2 / v.jerk_mps3 + v.motor_lag_s,
-          v.tracking_error_m};
+  const auto [acceleration_mps2, jerk_mps3] = followed_limits(v);
+  return {0.5 / acceleration_mps2, 0.5 * acceleration_mps2 / jerk_mps3 + v.motor_lag_s, v.tracking_error_m};
 }
 
 double tilt_acceleration_mps2(const VehicleModel& v) noexcept {
@@ -38,7 +63,7 @@ const char* cannot_fly(const VehicleModel& v, double visible_m) noexcept {
   const core::SinCos tilt = core::sin_cos(v.tilt_rad);
   if (thrust_to_weight_ratio(v) * tilt.cos < 1.0)
     return "cannot hold its height at limits.tilt_rad: must have thrust-to-weight of at least 1 / cos(tilt)";
-  if (drag_mps2(v, v.speed_mps) > tilt_acceleration_mps2(v))
+  if (left_mps2(v, v.speed_mps) < kLeastBraking_mps2)
     return "cannot fly as fast as limits.speed_mps: its drag there must be below g tan(limits.tilt_rad)";
   // Not as slowly as the slowest useful flight: as fast as its limit says is a question of the world.
   constexpr double kSlow_mps = 0.5;

@@ -112,14 +112,23 @@ inline constexpr std::array<VehicleKey, 28> kVehicleKeys = [] {
   return nullptr;
 }
 
-/// How far it travels until it stands, as trajectories end: measured, or derived from the limits.
+/// What trajectories get of the limits of acceleration and jerk, which they are at most of the time: a fifth of the tilt is the
+/// controller's, and what holds against drag at the top speed is not there for turns (it stands across them); a step of the jerk is followed one lag
+/// of the motors and the loops around them late, and so much beside the reference as the tracking error allows (mighty, 30 m/s3
+/// and 0.025 s: 0.14 m, that is 0.19 j lag; half for a reserve, and so that the attitude does not overshoot: paper 36 degrees, 41
+/// without). RT-safe: O(1).
+struct FollowedLimits {
+  double acceleration_mps2, jerk_mps3;
+};
+[[nodiscard]] FollowedLimits followed_limits(const VehicleModel& vehicle) noexcept;
+/// With what the speed may rise up to `speed_mps`: drag there is against it. RT-safe: O(1).
+[[nodiscard]] double speeding_up_mps2(const VehicleModel& vehicle, double speed_mps) noexcept;
+/// How far it travels until it stands, as trajectories end: measured, or derived from followed_limits().
 ///
-/// A trajectory ends in a minimum-snap stop, whose speed falls from v to 0 within T along
-///   v(t) = v (1 - S(t/T)),  S(x) = 35 x^4 - 84 x^5 + 70 x^6 - 20 x^7   (S' at most 35/16, S'' at most 7.5132)
-/// over the distance v T / 2. The acceleration limit a wants T >= 35/16 v/a, the jerk limit j wants
-/// T^2 >= 7.5132 v/j. With the first alone d = 35/32 v^2/a. Where the second wants more, it is at most
-/// 0.4293 a/j v more: the largest difference of the two over v. Before it brakes, motors take their lag to
-/// tilt the vehicle; after it, it stands as far beside its reference as the tracking error allows.
+/// A trajectory ends in a stop of constant jerk j up to the deceleration a, constant deceleration, and constant jerk
+/// back. It takes T = v/a + a/j, or less where v < a^2/j and a is not reached, over the distance v T / 2: d = v^2/2a +
+/// v a/2j. Before it brakes, motors take their lag to tilt the vehicle; after it, it stands as far beside its
+/// reference as the tracking error allows.
 /// RT-safe: O(1).
 [[nodiscard]] StoppingModel stopping_model(const VehicleModel& vehicle) noexcept;
 /// Sideways acceleration at the tilt limit, without losing height.

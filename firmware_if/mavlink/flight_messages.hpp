@@ -272,4 +272,49 @@ struct Statustext {
                                        Member<&Statustext::chunk_seq>{"chunk_seq"}};
 };
 
+/// A parameter by its name. PX4 has an INT32's bits in the float, ArduPilot the number.
+struct ParamRequestRead {
+  static constexpr MessageType kType = kParamRequestRead;
+  std::uint8_t target_system{};
+  std::uint8_t target_component{};
+  std::array<char, 16> param_id{};  ///< No terminator if it is full.
+  std::int16_t param_index{-1};     ///< -1: by name.
+  static constexpr std::tuple kMembers{Member<&ParamRequestRead::target_system>{"target_system"},
+                                       Member<&ParamRequestRead::target_component>{"target_component"},
+                                       Member<&ParamRequestRead::param_id>{"param_id"},
+                                       Member<&ParamRequestRead::param_index>{"param_index"}};
+};
+struct ParamSet {
+  static constexpr MessageType kType = kParamSet;
+  std::uint8_t target_system{};
+  std::uint8_t target_component{};
+  std::array<char, 16> param_id{};
+  float param_value{};
+  std::uint8_t param_type{};  ///< MAV_PARAM_TYPE; 6 INT32, 9 REAL32.
+  static constexpr std::tuple kMembers{
+      Member<&ParamSet::target_system>{"target_system"},
+      Member<&ParamSet::target_component>{"target_component"}, Member<&ParamSet::param_id>{"param_id"},
+      Member<&ParamSet::param_value>{"param_value"}, Member<&ParamSet::param_type>{"param_type"}};
+};
+/// The answer to both, with the value that is really held.
+struct ParamValue {
+  static constexpr MessageType kType = kParamValue;
+  std::array<char, 16> param_id{};
+  float param_value{};
+  std::uint8_t param_type{};
+  std::uint16_t param_count{};
+  std::uint16_t param_index{};
+  static constexpr std::tuple kMembers{
+      Member<&ParamValue::param_id>{"param_id"}, Member<&ParamValue::param_value>{"param_value"},
+      Member<&ParamValue::param_type>{"param_type"}, Member<&ParamValue::param_count>{"param_count"},
+      Member<&ParamValue::param_index>{"param_index"}};
+};
+
+/// Of the system's state only the battery.
+struct SysStatus {
+  static constexpr MessageType kType = kSysStatus;
+  std::int8_t battery_remaining{};  ///< Percent; -1: unknown.
+  static constexpr std::tuple kMembers{Member<&SysStatus::battery_remaining>{"battery_remaining"}};
+};
+
 }  // namespace roborun::firmware_if::mavlink

@@ -50,6 +50,11 @@ inline constexpr auto kParamSet = define(23, "PARAM_SET", 168,
                                           {kFloat, "param_value"},
                                           {kUint8, "param_type"}});
 
+/// Deprecated, and what ArduCopter asks for items with.
+inline constexpr auto kMissionRequest = define(
+    40, "MISSION_REQUEST", 230, {{kUint8, "target_system"}, {kUint8, "target_component"}, {kUint16, "seq"}},
+    {{kUint8, "mission_type"}});
+
 inline constexpr auto kMissionSetCurrent =
     define(41, "MISSION_SET_CURRENT", 28,
            {{kUint8, "target_system"}, {kUint8, "target_component"}, {kUint16, "seq"}});
@@ -134,6 +139,15 @@ inline constexpr auto kCommandAck = define(77, "COMMAND_ACK", 143, {{kUint16, "c
                                             {kInt32, "result_param2"},
                                             {kUint8, "target_system"},
                                             {kUint8, "target_component"}});
+
+inline constexpr auto kRadioStatus = define(109, "RADIO_STATUS", 185,
+                                            {{kUint8, "rssi"},
+                                             {kUint8, "remrssi"},
+                                             {kUint8, "txbuf"},
+                                             {kUint8, "noise"},
+                                             {kUint8, "remnoise"},
+                                             {kUint16, "rxerrors"},
+                                             {kUint16, "fixed"}});
 
 inline constexpr auto kTimesync = define(111, "TIMESYNC", 34, {{kInt64, "tc1"}, {kInt64, "ts1"}},
                                          {{kUint8, "target_system"}, {kUint8, "target_component"}});

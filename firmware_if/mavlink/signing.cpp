@@ -28,14 +28,14 @@ void Signer::sign(std::span<const std::uint8_t> frame,
                   std::span<std::uint8_t, kSignatureBlock_bytes> block) noexcept {
   block[0] = link_id_;
   for (std::size_t i = 0; i < 6; ++i) block[1 + i] = static_cast<std::uint8_t>(next_ >> (8U * i));
-  const auto first = hash(key_, frame, block.first<kLinkAndTime_bytes>());
+  const auto first = hash(key_.bytes(), frame, block.first<kLinkAndTime_bytes>());
   std::copy(first.begin(), first.end(), block.begin() + kLinkAndTime_bytes);
   ++next_;
 }
 
 SignatureVerdict Verifier::check(std::uint8_t sysid, std::uint8_t compid, std::span<const std::uint8_t> frame,
                                  std::span<const std::uint8_t, kSignatureBlock_bytes> block) noexcept {
-  const auto wanted = hash(key_, frame, block.first<kLinkAndTime_bytes>());
+  const auto wanted = hash(key_.bytes(), frame, block.first<kLinkAndTime_bytes>());
   unsigned difference = 0;  // all bytes, so that the time taken tells nothing of them
   for (std::size_t i = 0; i < wanted.size(); ++i)
     difference |= static_cast<unsigned>(wanted[i] ^ block[kLinkAndTime_bytes + i]);

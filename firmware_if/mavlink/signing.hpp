@@ -15,6 +15,28 @@ inline constexpr std::size_t kSignatureBlock_bytes = 13;
 inline constexpr std::size_t kKey_bytes = 32;
 using SigningKey = std::array<std::uint8_t, kKey_bytes>;
 
+/// Zeros, also where the compiler sees that nobody reads them.
+template <typename Bytes>
+void wipe(Bytes& bytes) noexcept {
+  for (auto& byte : bytes) {
+    volatile auto* const seen = &byte;
+    *seen = 0;
+  }
+}
+
+/// A copy of a key that leaves nothing of it in memory.
+class SecretKey {
+ public:
+  explicit SecretKey(const SigningKey& key) noexcept : key_(key) {}
+  SecretKey(const SecretKey&) = default;
+  SecretKey& operator=(const SecretKey&) = default;
+  ~SecretKey() { wipe(key_); }
+  [[nodiscard]] const SigningKey& bytes() const noexcept { return key_; }
+
+ private:
+  SigningKey key_;
+};
+
 /// Time of signatures: units of 10 us since 2015-01-01 00:00 UTC, 48 bits. Not a clock of the flight loop: it
 /// only ever tells old from new.
 using SigningTime = std::uint64_t;
@@ -44,7 +66,7 @@ class Signer {
             std::span<std::uint8_t, kSignatureBlock_bytes> block) noexcept;
 
  private:
-  SigningKey key_;
+  SecretKey key_;
   std::uint8_t link_id_;
   SigningTime next_;
 };
@@ -86,7 +108,7 @@ class Verifier {
   [[nodiscard]] SigningTime clock() const noexcept { return clock_; }
 
  private:
-  SigningKey key_;
+  SecretKey key_;
   std::span<Stream> streams_;
   SigningTime clock_;
 };

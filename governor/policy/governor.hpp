@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <numbers>
 
 #include "core/executive/cost_profile.hpp"
 #include "core/operating_point.hpp"
@@ -95,9 +96,9 @@ class Governor final : public DecisionPolicy {
   [[nodiscard]] Decision decide_static(const SpaceProfile& profile) const noexcept;
 
   // The steps of decide().
-  /// The coarsest level within the published finest cell: what finds nothing there, and it alone, is worth less.
+  /// The level whose cells are nearest to the published finest one: what finds nothing there, and it alone, is worth less.
   [[nodiscard]] int published_level() const noexcept {
-    return config_.lattice.coarsest_level_within(kPublishedCell_m);
+    return config_.lattice.coarsest_level_within(std::numbers::sqrt2 * kPublishedCell_m);
   }
   [[nodiscard]] int asked_level(const Task& task, Decision& decision) const noexcept;
   [[nodiscard]] double deadline_s(const Task& task, int asked_level, Decision& decision) const noexcept;

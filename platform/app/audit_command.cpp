@@ -115,39 +115,30 @@ std::vector<report::Requirement> requirements(const AuditOptions& options) {
   }
 }
 
-/// A word of a command line, as a shell reads it back.
-std::string shell_word(const std::string& word) {
-  constexpr std::string_view kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:@%";
-  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
-}
-
 /// As it was typed.
 std::string command_line() {
   std::ifstream file("/proc/self/cmdline", std::ios::binary);
   std::string line;
   for (std::string word; std::getline(file, word, '\0');)
-    line += (line.empty() ? "" : " ") + shell_word(word);
+    line += (line.empty() ? "" : " ") + input::shell_word(word);
   return line;
 }
 
 /// What flies the same again, but for its length and what is written.
 std::string same_flight(const AuditOptions& o) {
-  std::string line =
-      fmt::format("roborun audit --env {} --seed {} --rate {} --profile {} --vehicle {}", shell_word(o.env),
-                  o.seed, o.rate_Hz, shell_word(o.profile), shell_word(o.vehicle));
-  if (!o.settings.empty()) line += " --settings " + shell_word(o.settings);
+  std::string line = fmt::format("roborun audit --env {} --seed {} --rate {} --profile {} --vehicle {}",
+                                 input::shell_word(o.env), o.seed, o.rate_Hz, input::shell_word(o.profile),
+                                 input::shell_word(o.vehicle));
+  if (!o.settings.empty()) line += " --settings " + input::shell_word(o.settings);
   if (o.load) line += " --load";
   if (o.best_effort) line += " --best-effort";
   if (!o.can.empty())
-    line += fmt::format(" --can {},{} --props-off", shell_word(o.can[0]), shell_word(o.can[1]));
+    line += fmt::format(" --can {},{} --props-off", input::shell_word(o.can[0]), input::shell_word(o.can[1]));
   if (!o.kill_lines.empty())
-    line += fmt::format(" --kill-lines {},{}{}{}", shell_word(o.kill_lines[0]), shell_word(o.kill_lines[1]),
-                        o.active_low ? " --active-low" : "", o.pull_up ? " --pull-up" : "");
-  if (!o.spin.empty()) line += " --inject-spin " + shell_word(o.spin);
+    line += fmt::format(" --kill-lines {},{}{}{}", input::shell_word(o.kill_lines[0]),
+                        input::shell_word(o.kill_lines[1]), o.active_low ? " --active-low" : "",
+                        o.pull_up ? " --pull-up" : "");
+  if (!o.spin.empty()) line += " --inject-spin " + input::shell_word(o.spin);
   return line;
 }
 
@@ -299,7 +290,8 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
       "then.");
   add_number(*command, "--seconds", options->seconds, 1.0, 86400.0, "How long, 1 .. 86400");
   command
-      ->add_option("--rate", options->rate_Hz, "Of the flight lane, Hz: 100, 125, 160, 200, 250, 320 or 400")
+      ->add_option("--rate", options->rate_Hz,
+                   "Rate of the flight lane, Hz: 100, 125, 160, 200, 250, 320 or 400")
       ->capture_default_str();
   command->add_option("--env", options->env, "Environment to fly in: 1 .. 27, or a name")
       ->capture_default_str();
@@ -318,7 +310,7 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
                       "TOML file: cameras, wind, battery, fence (see platform/README.md)");
   command->add_flag("--load", options->load, "With stress-ng on all CPUs meanwhile");
   command->add_flag("--best-effort", options->best_effort,
-                    "Where real time is not to be had, run on without, and say so in the report");
+                    "Run also where real time cannot be had, and say so in the report");
   command->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
   command->add_option("--html", options->html, "Write the report as one HTML file with plots");
   command->add_option("--trace", options->trace,
@@ -328,15 +320,16 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
   command->add_option("--instructions", options->instructions,
                       "Show these counts beside the times: a file of toolchain/bench/run instructions");
   command->add_option("--require", options->require,
-                      "NAME=LIMIT,...: at most so much, else FAIL (see below)");
+                      "NAME=LIMIT,...: FAIL if the value is above the limit (see below)");
   command
       ->add_option(
           "--compare", options->compare,
-          "JSON files, before and after: what became worse; three or more a side (A1,A2,A3 B1,B2,B3) tell "
+          "JSON files, before and after: what became worse; three or more per side (A1,A2,A3 B1,B2,B3) tell "
           "it from noise")
       ->expected(2);
-  CLI::Option* tolerance = add_number(*command, "--tolerance", options->tolerance_ratio, 1.0, 100.0,
-                                      "With --compare: worse is more than so many times");
+  CLI::Option* tolerance =
+      add_number(*command, "--tolerance", options->tolerance_ratio, 1.0, 100.0,
+                 "With --compare: more than this many times the value before counts as worse");
   command
       ->add_option(
           "--can", options->can,
@@ -349,7 +342,8 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
   auto* kill_lines = command->add_option(
       "--kill-lines", options->kill_lines,
       "A kill switch on lines of this machine: normally open and normally closed contact, each a name or "
-      "CHIP:OFFSET. Does not begin unless it stands on run; stops the motors when it does not any more");
+      "CHIP:OFFSET. The run does not begin unless the switch stands on run, and stops the motors when it no "
+      "longer does");
   kill_lines->expected(2)->delimiter(',');
   command
       ->add_flag("--active-low", options->active_low,

@@ -98,7 +98,7 @@ int calibrate_board(const CalibrateOptions& options) {
     fmt::print("{}\n", json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
     return kDone;
   }
-  fmt::print("{}, {} samples a point, thread time; error on points that were not fitted:\n", board.machine,
+  fmt::print("{}, {} samples per point, thread time; error on points that were not fitted:\n", board.machine,
              4 * options.repeats);
   fmt::print("{:<10} {:>12} {:>12} {:>12} {:>12}\n", "stage", "mean: avg %", "max %", "p99: avg %", "max %");
   for (std::size_t i = 0; i < 3; ++i) {

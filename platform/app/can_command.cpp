@@ -214,7 +214,7 @@ std::string encode_one(const Json& object, std::size_t index) {
 
 int encode(const std::string& path) {
   std::size_t index = 0;
-  for_each_line(path, "a file of JSON objects, one a line", [&](const std::string& text, std::size_t number) {
+  for_each_line(path, "a file of one JSON object per line", [&](const std::string& text, std::size_t number) {
     if (text.find_first_not_of(" \t\r") == std::string::npos) return;
     std::string frames;
     try {
@@ -323,9 +323,9 @@ void add_bus_commands(CLI::App& can_app, const std::shared_ptr<CanOptions>& opti
   CLI::App* monitor_app = can_app.add_subcommand(
       "monitor", "As decode, live from a SocketCAN interface; counts of errors at the end");
   monitor_app->add_option("interface", options->interface, "can0")->required();
-  monitor_app->add_flag("--json", options->json, "As of decode");
+  monitor_app->add_flag("--json", options->json, "As in decode");
   add_number(*monitor_app, "--seconds", options->seconds, 0.0, 1e9,
-             "Stop after so long; default: at Ctrl-C (exit code 130)")
+             "Stop after this many seconds; default: at Ctrl-C (exit code 130)")
       ->default_str("");
   monitor_app->callback([options, &run] {
     run = [options] { return monitor(options->interface, options->json, options->seconds); };
@@ -363,23 +363,23 @@ void add_can_command(CLI::App& app, std::function<int()>& run) {
   CLI::App* can_app = app.add_subcommand("can", "DroneCAN tools: decode, encode, monitor, try ESCs");
   can_app->require_subcommand(1);
 
-  CLI::App* decode_app =
-      can_app->add_subcommand("decode",
-                              "candump log lines in, one line a transfer out. What is malformed is named on "
-                              "standard error, with a count "
-                              "of everything at the end; it does not change the exit code");
+  CLI::App* decode_app = can_app->add_subcommand(
+      "decode",
+      "candump log lines in, one line per transfer out. What is malformed is named on "
+      "standard error, with a count "
+      "of everything at the end; it does not change the exit code");
   decode_app->add_option("--candump", options->candump,
                          "Log of `candump -L` or `candump -l`; default: standard input");
   decode_app->add_flag(
       "--json", options->json,
-      "One JSON object a transfer: type, data_type_id, kind, source_node_id, transfer_id, priority, "
+      "One JSON object per transfer: type, data_type_id, kind, source_node_id, transfer_id, priority, "
       "time_s, interface, fields (a Timestamp `x` is `x_usec` in microseconds)");
   decode_app->callback(
       [options, &run] { run = [options] { return decode(options->candump, options->json); }; });
 
   CLI::App* encode_app = can_app->add_subcommand(
       "encode",
-      "JSON in, one object a line as `roborun can decode --json` writes them (type, source_node_id and "
+      "JSON in, one object per line as `roborun can decode --json` writes them (type, source_node_id and "
       "fields are "
       "needed; priority 16, transfer_id 0); candump log lines out, for canplayer or `roborun can decode`");
   encode_app->add_option("--json", options->encode_file, "File to read; default: standard input")

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <cstdlib>
 #include <map>
 #include <memory>
@@ -14,7 +13,7 @@
 #include "platform/app/options.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
-#include "stages/planning/ways.hpp"
+#include "platform/log/why.hpp"
 
 namespace roborun::app {
 namespace {
@@ -45,68 +44,34 @@ class Row {
   std::vector<std::string> field_;
 };
 
-std::string words_of_source(const Row& r) {
-  const std::string& source = r.text("budget_source");
-  if (source == "trajectory") return "the trajectory being flown: nowhere along it may the time run out";
-  if (source == "visibility") return "how far ahead it can see, with no trajectory to follow";
-  if (source == "shortest") return "the shortest decision there is: physics would allow even less";
-  if (source == "longest") return "usefulness: physics would allow more, but the decision is done by then";
-  if (source == "failures")
-    return "failed decisions before it: precision first, so it gets what the finer cells take";
-  if (source == "fixed") return "the static design: its knobs and its time never change";
-  return source;
-}
-
-std::string words_of_active(const std::string& active) {
-  static const std::map<std::string, std::string> kWords{
-      {"deadline", "all the time is used"},
-      {"v0_zero", "nothing is perceived"},
-      {"v0_v1", "all that is exported was just perceived"},
-      {"v_sensor", "all that the cameras see is taken"},
-      {"v_map", "all that the map holds is taken"},
-      {"v2_zero", "nothing is planned"},
-      {"v0_max", "perception is at the upper end of its knob"},
-      {"v1_max", "export is at the upper end of its knob"},
-      {"v2_max", "the planner is at the upper end of its knob: more is of no use"},
-      {"g_avg", "cells could be coarser but for the precision that the space asks for"},
-      {"d_obs", "cells could be coarser but for the nearest obstacle"},
-      {"g_min", "cells could be finer, but then not all that is in view would fit into the time"},
-      {"empty_precision", "no precision satisfies both bounds"},
-      {"empty_volume", "there is no volume"},
-      {"too_slow", "even with nothing to do, the stages take longer than there is time"}};
-  std::string text;
-  std::istringstream stream(active);
-  for (std::string name; std::getline(stream, name, '+');) {
-    const auto word = kWords.find(name);
-    text += fmt::format("  {:<16} {}\n", name, word == kWords.end() ? "" : word->second);
-  }
-  return text.empty() ? "  none\n" : text;
-}
-
-/// "camera 1 fog+camera 2 turned" as a list.
-std::string words_of_refused(std::string refused) {
-  for (std::size_t at = refused.find('+'); at != std::string::npos; at = refused.find('+', at))
-    refused.replace(at, 1, ", ");
-  return refused;
-}
-
-std::string metres(const Row& r, const char* key) {
-  const double x = r.number(key);
-  return std::isfinite(x) ? fmt::format("{:.1f} m", x) : "none in view";
-}
-
-std::string words_of_ways(const Row& r) {
-  const std::string& ways = r.text("ways");
-  if (ways == "ok")
-    return fmt::format("{:.1f} m to the goal (a metre that nobody has seen yet counts as {:g})",
-                       r.number("way_m"), stages::kUnknownWeight);
-  if (ways == "no path") return "all that can be reached was seen, and none of it leads to the goal";
-  if (ways == "infeasible")
-    return "none with the room that plans take; one that is narrower, or not seen, there may be";
-  if (ways == "goal blocked") return "the vehicle fits nowhere near the goal";
-  if (ways == "start blocked") return "no way is known from here, which proves nothing";
-  if (ways == "budget spent") return "no time was left to look";
-  return "nothing remembers ways: it plans to its horizon";
+/// The texts of the entry are those of the row.
+log::DecisionEntry entry_of(const Row& r) {
+  log::DecisionEntry e;
+  e.budget_source = r.text("budget_source").c_str();
+  e.solver = r.text("solver").c_str();
+  e.ways = r.text("ways").c_str();
+  e.planner = r.text("planner").c_str();
+  e.smoother = r.text("smoother").c_str();
+  e.active.append(r.text("active"));
+  e.refused.append(r.text("refused"));
+  const std::initializer_list<std::pair<const char*, double*>> numbers{
+      {"time_budget_s", &e.time_budget_s},
+      {"deadline_s", &e.deadline_s},
+      {"p0_m", &e.p0_m},
+      {"p1_m", &e.p1_m},
+      {"v0_m3", &e.v0_m3},
+      {"v1_m3", &e.v1_m3},
+      {"v2_m3", &e.v2_m3},
+      {"visible_m", &e.visible_m},
+      {"closest_obstacle_m", &e.closest_obstacle_m},
+      {"gap_average_m", &e.gap_average_m},
+      {"sensor_volume_m3", &e.sensor_volume_m3},
+      {"map_volume_m3", &e.map_volume_m3},
+      {"demand_m", &e.demand_m},
+      {"speed_limit_mps", &e.speed_limit_mps}};
+  for (const auto& [key, value] : numbers) *value = r.number(key);
+  if (r.text("ways") == "ok") e.way_m = r.number("way_m");
+  return e;
 }
 
 }  // namespace
@@ -159,24 +124,9 @@ std::string explain_decision(const std::string& name, const std::string& csv, do
       fmt::format("Decision {} of {}, at {:.2f} s: at ({:.1f}, {:.1f}, {:.1f}) m, flying {:.1f} m/s.\n\n",
                   number, r.text("design"), r.number("time_s"), r.number("x_m"), r.number("y_m"),
                   r.number("z_m"), r.number("speed_mps"));
-  text += fmt::format(
-      "What it saw   nearest obstacle {}, average gap {}, free way ahead {}; {:.0f} m3 in view, {:.0f} m3 in "
-      "the map.\n",
-      metres(r, "closest_obstacle_m"), metres(r, "gap_average_m"), metres(r, "visible_m"),
-      r.number("sensor_volume_m3"), r.number("map_volume_m3"));
-  if (!r.text("refused").empty())
-    text += fmt::format("Not believed  {}.\n", words_of_refused(r.text("refused")));
-  text += fmt::format("How long      {:.2f} s until it must have decided, {:.2f} s granted. Set by {}.\n",
-                      r.number("time_budget_s"), r.number("deadline_s"), words_of_source(r));
-  text += fmt::format(
-      "How precise   map {} m, plan {} m (the space asks for {} or finer); perceived {:.0f}, exported "
-      "{:.0f}, planned {:.0f} "
-      "m3.\n",
-      r.text("p0_m"), r.text("p1_m"), metres(r, "demand_m"), r.number("v0_m3"), r.number("v1_m3"),
-      r.number("v2_m3"));
-  text += "Which way     " + words_of_ways(r) + "\n";
-  text +=
-      fmt::format("How fast      the next trajectory may fly {:.1f} m/s.\n\n", r.number("speed_limit_mps"));
+  const log::DecisionEntry entry = entry_of(r);
+  for (const std::string& one : log::why_of(entry)) text += one + "\n";
+  text += "\n";
   text += fmt::format("{:<14} {:>12} {:>9}\n", "stage", "predicted s", "spent s");
   for (std::size_t i = 0; i < core::kStageCount; ++i) {
     const char* stage = core::to_string(static_cast<core::StageId>(i));
@@ -185,9 +135,8 @@ std::string explain_decision(const std::string& name, const std::string& csv, do
   }
   text += fmt::format("{:<14} {:>12} {:>9.4f}   {}\n\n", "all", "", r.number("latency_s"),
                       r.text("missed") == "1" ? "LATE: the vehicle is on its braking tail" : "in time");
-  text +=
-      fmt::format("What held it back (solver: {})\n{}", r.text("solver"), words_of_active(r.text("active")));
-  text += fmt::format("\nOutcome       planner: {}; smoother: {}.\n", r.text("planner"), r.text("smoother"));
+  const std::vector<std::string> outcome = log::outcome_of(entry);
+  for (const std::string& one : outcome) text += (&one == &outcome.back() ? "\n" : "") + one + "\n";
   return text;
 }
 
@@ -206,7 +155,7 @@ void add_explain_command(CLI::App& app, std::function<int()>& run) {
   add_number(*command, "--at", options->at_s, -1e6, 1e6, "Seconds since the start of the mission")
       ->default_str("")
       ->required();
-  command->add_option("--design", options->design, "If the trace holds several [the first]");
+  command->add_option("--design", options->design, "Which design, if the trace holds several [the first]");
   command->callback([options, &run] {
     run = [options] {
       const std::string csv = input::read_text(options->file, "a file that roborun fly --trace wrote");

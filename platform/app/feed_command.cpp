@@ -9,38 +9,25 @@
 
 #include "platform/app/exit_code.hpp"
 #include "platform/app/options.hpp"
-#include "platform/app/port_command.hpp"
+#include "platform/app/plant_arguments.hpp"
 #include "platform/app/recording_arguments.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/stop_signal.hpp"
+#include "platform/live/pictures.hpp"
 #include "platform/report/progress_line.hpp"
-#include "platform/sensor_port/roborun_port.h"
+#include "platform/sensor_port/port_names.hpp"
+#include "platform/sensor_port/port_writer.hpp"
 
 namespace roborun::app {
 namespace {
 
-/// A port that this process writes.
-class FedPort {
- public:
-  FedPort(const std::string& name, std::uint32_t kind, std::size_t most_bytes) {
-    constexpr std::uint32_t kSlots = 8;
-    const std::string path = port_path(name);
-    const char* wrong =
-        roborun_port_open(&writer_, path.c_str(), kind, static_cast<std::uint32_t>(most_bytes), kSlots);
-    if (wrong != nullptr) throw InputError(fmt::format("{}: {}", path, wrong));
-  }
-  ~FedPort() { roborun_port_close(&writer_); }
-  FedPort(const FedPort&) = delete;
-  FedPort& operator=(const FedPort&) = delete;
-  template <typename Sample>
-  void write(const Sample& sample, std::span<const float> payload = {}) {
-    (void)roborun_port_write(&writer_, &sample, payload.data(),
-                             static_cast<std::uint32_t>(payload.size_bytes()));
-  }
-
- private:
-  roborun_port_writer writer_{-1, 0, nullptr};
-};
+void open_port(sensor_port::PortWriter& port, const std::string& name, std::uint32_t kind,
+               std::size_t most_bytes) {
+  constexpr std::uint32_t kSlots = 8;
+  const std::string path = sensor_port::port_path(name);
+  const std::string wrong = port.open(path, kind, most_bytes, kSlots);
+  if (!wrong.empty()) throw InputError(fmt::format("{}: {}", path, wrong));
+}
 
 struct FeedFilesOptions {
   RecordingArguments recording;
@@ -48,22 +35,6 @@ struct FeedFilesOptions {
   double rate_Hz{10.0};
   bool loop{false};
 };
-
-roborun_port_depth depth_of(const firmware_if::DepthFrame& f, const roborun_port_stamp& at) {
-  roborun_port_depth d{};
-  d.at = at;
-  d.width = f.width;
-  d.height = f.height;
-  d.pixel = ROBORUN_PORT_FLOAT32_M;
-  d.fx = 0.5F * static_cast<float>(f.width) / f.tan_half_width;
-  d.fy = 0.5F * static_cast<float>(f.height) / f.tan_half_height;
-  d.cx = 0.5F * static_cast<float>(f.width) - 0.5F;
-  d.cy = 0.5F * static_cast<float>(f.height) - 0.5F;
-  d.range_min_m = f.range_min_m;
-  d.range_m = f.range_m;
-  d.mount.q_BS[0] = 1.0F;
-  return d;
-}
 
 /// The camera is the body. The speed is what led here from the pose before.
 roborun_port_odometry odometry_of(const Pose& X_WB, const Pose& before, double step_s,
@@ -89,10 +60,9 @@ int feed_files(const FeedFilesOptions& options) {
   if (recording.has_clouds())
     throw InputError(fmt::format("{}: holds clouds: must be depth images", options.recording.from));
   // All images are of one size.
-  FedPort images(options.port, ROBORUN_PORT_DEPTH, recording.load(0).front().frame.depth_m.size_bytes());
-  std::unique_ptr<FedPort> odometry;
-  if (!options.odometry.empty())
-    odometry = std::make_unique<FedPort>(options.odometry, ROBORUN_PORT_ODOMETRY, 0);
+  sensor_port::PortWriter images, odometry;
+  open_port(images, options.port, ROBORUN_PORT_DEPTH, recording.load(0).front().frame.depth_m.size_bytes());
+  if (!options.odometry.empty()) open_port(odometry, options.odometry, ROBORUN_PORT_ODOMETRY, 0);
   const double step_s = 1.0 / options.rate_Hz;
   const input::StopOnSignal stop;
   report::ProgressLine line;
@@ -112,11 +82,11 @@ int feed_files(const FeedFilesOptions& options) {
                    Clock::now());
     at.stamp_ns = std::chrono::nanoseconds(Clock::now().time_since_epoch()).count();
     ++at.sequence;
-    images.write(depth_of(posed.frame, at), posed.frame.depth_m);
-    if (odometry) {
+    images.write(sensor_port::depth_header(posed.frame, at), std::as_bytes(posed.frame.depth_m));
+    if (odometry.is_open()) {
       roborun_port_odometry o = odometry_of(posed.X_WC, i == 0 ? posed.X_WC : before, step_s, at);
       o.reset_counter = round;  // from the last pose back to the first
-      odometry->write(o);
+      odometry.write(o);
     }
     before = posed.X_WC;
     if (line.due())
@@ -125,11 +95,39 @@ int feed_files(const FeedFilesOptions& options) {
   return input::StopOnSignal::requested() ? kInterrupted : kDone;
 }
 
+int feed_plant(const PlantArguments& arguments) {
+  live::PictureFeed config;
+  config.mission = plant_mission(arguments);
+  config.port = arguments.port;
+  const sitl::World world = plant_world(arguments, config.mission);
+  const input::StopOnSignal stop;
+  config.stop = &input::StopOnSignal::requested;
+  const std::uint64_t sent = live::feed_pictures(world, config);
+  fmt::print("{} pictures sent\n", sent);
+  return input::StopOnSignal::requested() ? kInterrupted : kDone;
+}
+
+void add_feed_plant(CLI::App& feed, std::function<int()>& run) {
+  const auto options = std::make_shared<PlantArguments>();
+  CLI::App* plant =
+      feed.add_subcommand("plant", "What the cameras and LiDARs of a plant see, as a process of its own");
+  plant->footer(
+      "With the plant's own vehicle, world and seed. Ends with the plant; may be started again in flight.\n\n"
+      "Example, in three terminals:\n"
+      "  roborun plant --env 14 --port demo --no-pictures\n"
+      "  roborun feed plant --env 14 --port demo\n"
+      "  roborun run --link port:demo --goal 900,0,5 --bounds=-100,-100,1.5,1000,100,10\n\n"
+      "Exit code: 0 the plant has ended, 2 bad input, or no plant, 130 interrupted.");
+  add_plant_arguments(*plant, *options);
+  plant->callback([options, &run] { run = [options] { return feed_plant(*options); }; });
+}
+
 }  // namespace
 
 void add_feed_command(CLI::App& app, std::function<int()>& run) {
   CLI::App* feed = app.add_subcommand("feed", "Feeders: processes that write to sensor ports (roborun port)");
   feed->require_subcommand(1);
+  add_feed_plant(*feed, run);
   const auto options = std::make_shared<FeedFilesOptions>();
   CLI::App* files = feed->add_subcommand("files", "Recorded depth images, as often as asked");
   files->footer(

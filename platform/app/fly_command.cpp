@@ -12,6 +12,7 @@
 
 #include "platform/app/exit_code.hpp"
 #include "platform/app/options.hpp"
+#include "platform/app/plan_argument.hpp"
 #include "platform/app/world_arguments.hpp"
 #include "platform/board/board_profile.hpp"
 #include "platform/board/plugin_loader.hpp"
@@ -47,13 +48,16 @@ struct FlyOptions {
   std::string world;
   WorldArguments in_file;
   std::string vehicle{"paper"};
+  std::string autopilot{"none"};
+  std::string plan;
   std::string settings;
   std::string host_file;
   double host_factor{1.0};
-  std::string record;
+  std::string log;
   std::string trace;
   std::string plot;
   std::string colour{"speed"};
+  bool tune{false};
   bool json{false};
 };
 
@@ -119,6 +123,7 @@ int fly(const FlyOptions& options) {
   for (const std::string& name : input::split(options.design))
     designs.push_back(mission::design_of("--design", name));
   const sitl::Mission mission = sitl::mission_of(options.mission);
+  const auto autopilot = mission::autopilot_of("--autopilot", options.autopilot);
   const std::uint64_t seed = input::seed_of("--seed", options.seed);
   const auto colour =
       std::find(report::kPathColourName.begin(), report::kPathColourName.end(), options.colour);
@@ -127,18 +132,19 @@ int fly(const FlyOptions& options) {
   if (colour == report::kPathColourName.end() && !maps && !known)
     throw InputError(fmt::format("--color: unknown colour '{}': must be {}, all or known", options.colour,
                                  fmt::join(report::kPathColourName, ", ")));
-  if (!options.record.empty() && designs.size() != 1)
-    throw InputError("--record: one flight a file: must go with one --design");
+  if (!options.log.empty() && designs.size() != 1)
+    throw InputError("--log: one flight per file: must go with one --design");
   mission::MissionConfig config;
   const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.vehicle);
   mission::set_vehicle(config, vehicle);
   std::vector<std::string> inputs = vehicle.patterns;
-  for (const std::string& path : {options.vehicle, options.world, options.settings, options.profile})
+  for (const std::string& path :
+       {options.vehicle, options.world, options.settings, options.profile, options.plan})
     inputs.push_back(path);
   if (options.profile == "host") inputs.push_back(host_file_of(options));
   for (const std::string& name : {options.map, options.planner, options.ways})
     inputs.push_back(name.substr(name.find(':') + 1));  // of a plugin
-  input::check_outputs({{"--record", options.record}, {"--trace", options.trace}, {"--plot", options.plot}},
+  input::check_outputs({{"--log", options.log}, {"--trace", options.trace}, {"--plot", options.plot}},
                        inputs);
   if (!options.settings.empty()) mission::load_settings(options.settings, config);
   std::string env;
@@ -161,29 +167,29 @@ int fly(const FlyOptions& options) {
     zone_m = named.knobs.spread_m;
     title = fmt::format("Environment {} ({}), {}, seed {}", named.number, named.name, options.mission, seed);
   }
+  if (!options.plan.empty() && !config.goals.empty()) throw InputError("--goal, --plan: must be one of both");
+  if (autopilot) config.autopilot = mission::AutopilotChoice{*autopilot, options.tune};
+  if (!options.plan.empty()) take_plan(options.plan, config);
   for (const std::string& line : mission::beyond_reach(*world, config))
     fmt::print(stderr, "roborun: {}\n", line);
   const board::Profile profile = profile_of(options);
   if (options.vehicle != "paper") title += fmt::format(", vehicle {}", options.vehicle);
   title += fmt::format(", cost profile {}", options.profile);
 
+  if (options.tune && !autopilot)
+    throw InputError("--autopilot-tune: must go with --autopilot px4 or arducopter");
+  if (autopilot) title += fmt::format(", flown by a fake {}", options.autopilot);
+
   config.profile_name = options.profile;
   config.flight.costs = profile.costs;
   config.flight.model = profile.model;
-  if (options.profile == "host") {
+  if (options.profile == "host")
     config.host_factor = options.host_factor;
-  } else {
+  else
     config.host_costs = board::known_host_costs({options.map, options.planner});
-    if (!config.host_costs && board::uses_plugin({options.map, options.planner}))
-      fmt::print(
-          stderr,
-          "roborun: this machine is not measured: what the plugin counts is compared with the profile {} "
-          "alone (once roborun fly --profile host: with this machine too)\n",
-          options.profile);
-  }
   config.seed = seed;
   config.keep_known = known;
-  config.record = options.record;
+  config.log = options.log;
   config.backends.map = options.map;
   config.backends.planner = options.planner;
   config.backends.ways = options.ways;
@@ -197,10 +203,10 @@ int fly(const FlyOptions& options) {
     config.each_frame = [&](const mission::FrameRecord& frame) {
       if (!input::StopOnSignal::requested()) return;
       throw input::Interrupted(
-          fmt::format("{} after {:.0f} s of flight, {:.0f} m from the goal; {} of {} designs flown; no file "
-                      "was written",
+          fmt::format("{} after {:.0f} s of flight, {:.0f} m from the goal; {} of {} designs flown; {}",
                       governor::to_string(design), seconds(frame.now.time_since_epoch()),
-                      (world->goal_W() - frame.truth.p_WB).norm(), reports.size(), designs.size()));
+                      (world->goal_W() - frame.truth.p_WB).norm(), reports.size(), designs.size(),
+                      options.log.empty() ? "no file was written" : "the log ends there"));
     };
     reports.push_back(mission::fly_mission(*world, config, [&line, design](const mission::Progress& p) {
       if (!line.due()) return;
@@ -215,6 +221,12 @@ int fly(const FlyOptions& options) {
     result.believed = believes(options, reports.back());
     all_believed = all_believed && result.believed;
   }
+  if (options.profile != "host" && !config.host_costs && board::uses_plugin({options.map, options.planner}))
+    fmt::print(
+        stderr,
+        "roborun: this machine is not measured: what the plugin counts was compared with the profile {} "
+        "alone (once roborun fly --profile host: with this machine too)\n",
+        options.profile);
 
   if (options.json) {
     for (const report::MissionReport& r : reports) fmt::print("{}\n", report::to_json(r.result));
@@ -237,7 +249,9 @@ int fly(const FlyOptions& options) {
   }
   if (!options.json && !options.plot.empty()) fmt::print("picture: {}\n", options.plot);
   if (!options.json && !options.trace.empty()) fmt::print("trace: {}\n", options.trace);
-  if (!options.json && !options.record.empty()) fmt::print("recording: {}\n", options.record);
+  if (!options.json && !options.log.empty()) fmt::print("log: {}\n", options.log);
+  for (const report::MissionReport& r : reports)
+    if (!r.log_error.empty()) throw InputError(r.log_error);
   return all_reached && all_believed ? kDone : kNotGood;
 }
 
@@ -303,10 +317,26 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
       ->add_option("--vehicle", options->vehicle,
                    "Vehicle: a shipped one (roborun vehicle list), or a vehicle file")
       ->capture_default_str();
+  fly_app->add_option("--plan", options->plan,
+                      "Mission of a .plan or .waypoints file, whose home is (0, 0, 0), with its fence: "
+                      "way-points, holds, speeds, returns, "
+                      "releases; it ends over the place of the landing");
+  fly_app
+      ->add_option("--autopilot", options->autopilot,
+                   "Who flies the vehicle: none (the runtime itself, to the motors), or px4, arducopter: a "
+                   "fake one that "
+                   "obeys its rules, over MAVLink (platform/sitl/README.md)")
+      ->capture_default_str();
+  fly_app->add_flag(
+      "--autopilot-tune", options->tune,
+      "Set the autopilot's limits of acceleration and jerk to the vehicle's before the take-off; default: "
+      "the plans keep to its own");
   fly_app->add_option("--settings", options->settings,
                       "Cameras, wind, battery, speed from a TOML file (see platform/README.md)");
-  fly_app->add_option("--record", options->record,
-                      "Write all inputs of the flight to this file, for roborun replay (0.3 MB a decision)");
+  fly_app->add_option(
+      "--log", options->log,
+      "Write what the flight read, did and why to this MCAP file, for roborun replay, Foxglove and "
+      "PlotJuggler");
   fly_app->add_option("--trace", options->trace, "Write every decision to this CSV file");
   fly_app->add_option("--plot", options->plot, "Write a picture of the mission to this SVG file");
   CLI::Option* colour =
@@ -316,7 +346,7 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
               "What colours the paths of --plot: speed, precision, volume, latency, visibility, deadline; "
               "all: a map of each; known: speed, over what the map knew at the end")
           ->capture_default_str();
-  fly_app->add_flag("--json", options->json, "One JSON object a design on standard output, nothing else");
+  fly_app->add_flag("--json", options->json, "One JSON object per design on standard output, nothing else");
   fly_app->callback([=, &run] {
     const bool host = options->profile == "host";
     refuse_alone(*host_factor, host, "--profile host");

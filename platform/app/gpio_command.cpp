@@ -79,7 +79,7 @@ void add_gpio_command(CLI::App& app, std::function<int()>& run) {
 
   CLI::App* list_app =
       gpio_app->add_subcommand("list", "All lines: chip, offset, name, direction, who uses it");
-  list_app->add_flag("--json", options->json, "One JSON object a line");
+  list_app->add_flag("--json", options->json, "One JSON object per line");
   list_app->callback([options, &run] { run = [options] { return list(options->json); }; });
 
   CLI::App* check_app = gpio_app->add_subcommand(

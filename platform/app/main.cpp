@@ -24,13 +24,17 @@
 #include "platform/app/explain_command.hpp"
 #include "platform/app/feed_command.hpp"
 #include "platform/app/fly_command.hpp"
+#include "platform/app/goto_command.hpp"
 #include "platform/app/gpio_command.hpp"
 #include "platform/app/map_command.hpp"
 #include "platform/app/mavlink_command.hpp"
 #include "platform/app/memory_command.hpp"
 #include "platform/app/options.hpp"
+#include "platform/app/plant_command.hpp"
 #include "platform/app/port_command.hpp"
 #include "platform/app/replay_command.hpp"
+#include "platform/app/report_command.hpp"
+#include "platform/app/run_command.hpp"
 #include "platform/app/scenario_command.hpp"
 #include "platform/app/solve_command.hpp"
 #include "platform/app/sweep_command.hpp"
@@ -83,6 +87,9 @@ int run_command(int argc, char** argv) {
   app.footer(cli::kExitCodes);
   std::function<int()> run;
   cli::add_fly_command(app, run);
+  cli::add_plant_command(app, run);
+  cli::add_run_command(app, run);
+  cli::add_goto_command(app, run);
   cli::add_calibrate_command(app, run);
   cli::add_explain_command(app, run);
   cli::add_solve_command(app, run);
@@ -97,6 +104,7 @@ int run_command(int argc, char** argv) {
   cli::add_sweep_command(app, run);
   cli::add_scenario_command(app, run);
   cli::add_replay_command(app, run);
+  cli::add_report_command(app, run);
   cli::add_vehicle_command(app, run);
   cli::add_config_command(app, run);
   cli::add_world_command(app, run);

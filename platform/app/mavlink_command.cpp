@@ -4,21 +4,28 @@
 #include <unistd.h>
 
 #include <charconv>
+#include <chrono>
 #include <cstdio>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "firmware_if/mavlink/flight_messages.hpp"
 #include "platform/app/exit_code.hpp"
 #include "platform/app/input_lines.hpp"
+#include "platform/app/options.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/json_reader.hpp"
 #include "platform/input/output_file.hpp"
+#include "platform/input/stop_signal.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mavlink/frame_log.hpp"
+#include "platform/mavlink/link.hpp"
 #include "platform/mavlink/message_json.hpp"
+#include "platform/mavlink/signed_end.hpp"
 
 namespace roborun::app {
 namespace {
@@ -26,23 +33,6 @@ namespace {
 namespace mav = firmware_if::mavlink;
 using Json = nlohmann::ordered_json;
 using mav::Event;
-
-/// 64 hexadecimal digits, in a file: a key on the command line is in the history of the shell. The complaint does
-/// not repeat what was read.
-std::optional<mav::SigningKey> read_key(const std::string& path) {
-  if (path.empty()) return std::nullopt;
-  constexpr const char* kWanted = "a file of 64 hexadecimal digits";
-  std::string text = input::read_text(path, kWanted, 4096);
-  text.erase(text.find_last_not_of(" \t\r\n") + 1);
-  mav::SigningKey key{};
-  bool good = text.size() == 2 * key.size();
-  for (std::size_t i = 0; good && i < key.size(); ++i) {
-    const char* at = text.data() + 2 * i;
-    good = std::from_chars(at, at + 2, key.at(i), 16).ptr == at + 2;
-  }
-  if (!good) throw InputError(fmt::format("--key: {}: no key: must be {}", path, kWanted));
-  return key;
-}
 
 // ---- decode
 
@@ -63,17 +53,18 @@ void print_frame(const mav::Frame& frame, std::optional<std::uint64_t> time_us, 
              frame.type->name, frame.has_signature ? " (signed)" : "", out["fields"].dump());
 }
 
-void summarise(const mav::Receiver::Counters& counters, const std::map<std::uint32_t, std::size_t>& unknown) {
+void summarise(const char* command, const mav::Receiver::Counters& counters,
+               const std::map<std::uint32_t, std::size_t>& unknown) {
   const auto count = [&](Event event) { return counters.events.at(static_cast<std::size_t>(event)); };
   std::string ids;
   for (const auto& [id, times] : unknown)
     ids += fmt::format("{}{} x{}", ids.empty() ? ": " : ", ", id, times);
   fmt::print(stderr,
-             "roborun mavlink decode: {} messages, {} of unknown ids{}, {} with a wrong checksum, {} with "
+             "roborun mavlink {}: {} messages, {} of unknown ids{}, {} with a wrong checksum, {} with "
              "unknown flags, {} cut short, {} not signed, {} wrongly signed, {} signed but not new, {} "
              "signed by one "
              "sender too many, {} bytes outside of frames\n",
-             count(Event::kFrame), count(Event::kUnknownId), ids, count(Event::kBadCrc),
+             command, count(Event::kFrame), count(Event::kUnknownId), ids, count(Event::kBadCrc),
              count(Event::kBadFlags), count(Event::kCut), count(Event::kUnsigned),
              count(Event::kBadSignature), count(Event::kReplayed), count(Event::kNoRoom),
              counters.garbage_bytes);
@@ -81,11 +72,11 @@ void summarise(const mav::Receiver::Counters& counters, const std::map<std::uint
 
 int decode(const DecodeOptions& options) {
   constexpr std::size_t kMostStreams = 1024;
-  const auto key = read_key(options.key);
+  const auto key = mavlink::read_key("--key", options.key);
   std::vector<mav::Verifier::Stream> streams(kMostStreams);
   std::optional<mav::Verifier> verifier;
   // A recording may be of any age: its own time stamps are the clock.
-  if (key) verifier.emplace(*key, streams, mav::SigningTime{0});
+  if (key) verifier.emplace(key->bytes(), streams, mav::SigningTime{0});
   std::map<std::uint32_t, std::size_t> unknown;
   const auto visit = [&](Event event, const mav::Frame& frame, std::optional<std::uint64_t> time_us) {
     if (event == Event::kUnknownId) ++unknown[frame.msgid];
@@ -94,7 +85,8 @@ int decode(const DecodeOptions& options) {
   input::InputFile file = open_input(options.file, "recorded MAVLink: a raw stream or a .tlog");
   mav::Verifier* const judge = verifier ? &*verifier : nullptr;
   const bool tlog = options.tlog || options.file.ends_with(".tlog");
-  summarise(tlog ? mavlink::read_tlog(file, judge, visit) : mavlink::read_stream(file, judge, visit),
+  summarise("decode",
+            tlog ? mavlink::read_tlog(file, judge, visit) : mavlink::read_stream(file, judge, visit),
             unknown);
   return kDone;
 }
@@ -109,28 +101,125 @@ int encode(const EncodeOptions& options) {
   input::check_outputs({{"--out", options.out}}, {options.file, options.key});
   if (options.out.empty() && isatty(STDOUT_FILENO) != 0)
     throw InputError("frames are no text: must go to --out FILE or into a pipe");
-  const auto key = read_key(options.key);
+  const auto key = mavlink::read_key("--key", options.key);
   std::optional<input::OutputFile> out;
   if (!options.out.empty()) out.emplace(options.out);
   std::uint8_t index = 0;
-  for_each_line(options.file, "a file of JSON objects, one a line",
-                [&](const std::string& text, std::size_t number) {
-                  if (text.find_first_not_of(" \t\r") == std::string::npos) return;
-                  std::vector<std::uint8_t> frame;
-                  try {
-                    frame = mavlink::from_json(input::parse_json(text), index++, key ? &*key : nullptr);
-                  } catch (const std::exception& error) {
-                    throw InputError(fmt::format("line {}: {}", number, input::json_complaint(error)));
-                  }
-                  const std::string bytes(frame.begin(), frame.end());
-                  if (out) {
-                    out->write(bytes);
-                  } else {
-                    (void)std::fwrite(bytes.data(), 1, bytes.size(), stdout);  // main() says it if this fails
-                  }
-                });
+  for_each_line(
+      options.file, "a file of one JSON object per line", [&](const std::string& text, std::size_t number) {
+        if (text.find_first_not_of(" \t\r") == std::string::npos) return;
+        std::vector<std::uint8_t> frame;
+        try {
+          frame = mavlink::from_json(input::parse_json(text), index++, key ? &key->bytes() : nullptr);
+        } catch (const std::exception& error) {
+          throw InputError(fmt::format("line {}: {}", number, input::json_complaint(error)));
+        }
+        const std::string bytes(frame.begin(), frame.end());
+        if (out) {
+          out->write(bytes);
+        } else {
+          (void)std::fwrite(bytes.data(), 1, bytes.size(), stdout);  // main() says it if this fails
+        }
+      });
   if (out) out->commit();
   return kDone;
+}
+
+// ---- monitor
+
+struct MonitorOptions {
+  std::string url, key;
+  bool json{false}, greet{false};
+  double seconds{1e9};
+};
+
+MonotonicTime now() {
+  return MonotonicTime{
+      std::chrono::duration_cast<Nanos>(std::chrono::steady_clock::now().time_since_epoch())};
+}
+
+/// What a ground station says each second: some autopilots answer only to somebody.
+void greet(mavlink::Link& link, std::uint8_t seq, mav::Signer* signer) {
+  std::array<std::uint8_t, mav::kMostFrame_bytes> bytes{};
+  constexpr std::uint8_t kGroundStation = 6;
+  const auto length =
+      mav::write_frame(mav::Heartbeat::kType, {seq, 255, 190},
+                       mav::pack(mav::Heartbeat{kGroundStation, 8, 0, 0, 4, 3}), signer, bytes);
+  (void)link.write(now(), std::span<const std::uint8_t>(bytes).first(length.value()));
+}
+
+int monitor(const MonitorOptions& options) {
+  mavlink::Link link(mavlink::parse_link(options.url));
+  const auto key = mavlink::read_key("--key", options.key);
+  const auto unix_us = std::chrono::duration_cast<std::chrono::microseconds>(
+                           std::chrono::system_clock::now().time_since_epoch())
+                           .count();
+  std::vector<mav::Verifier::Stream> streams(64);
+  std::optional<mav::Verifier> verifier;
+  std::optional<mav::Signer> signer;
+  if (key) verifier.emplace(key->bytes(), streams, mav::signing_time(unix_us));
+  if (key) signer.emplace(key->bytes(), 190, mav::signing_time(unix_us));
+  mav::Receiver receiver(verifier ? &*verifier : nullptr);
+  std::map<std::uint32_t, std::size_t> unknown;
+  std::array<std::uint8_t, 4096> bytes{};
+  const MonotonicTime start = now();
+  MonotonicTime greeted = start - Nanos{1'000'000'000};
+  std::uint8_t seq = 0;
+  bool was_open = false;
+  const input::StopOnSignal stop;
+  for (MonotonicTime at = start;
+       at < start + from_seconds(options.seconds) && !input::StopOnSignal::requested(); at = now()) {
+    std::span<const std::uint8_t> came(bytes.data(), link.read(at, bytes));
+    if (link.is_open() != was_open) {
+      was_open = link.is_open();
+      fmt::print(stderr, "roborun mavlink monitor: {} {}\n", options.url, was_open ? "open" : "lost");
+    }
+    if (options.greet && at - greeted >= Nanos{1'000'000'000}) {
+      greeted = at;
+      if (verifier) signer->advance_clock(verifier->clock());
+      greet(link, seq++, signer ? &*signer : nullptr);
+    }
+    if (came.empty()) {
+      (void)std::fflush(stdout);
+      std::this_thread::sleep_for(std::chrono::milliseconds{2});
+      continue;
+    }
+    while (!came.empty()) {
+      came = came.subspan(receiver.push(came));
+      mav::Frame frame;
+      for (Event event = receiver.next(frame); event != Event::kNothing; event = receiver.next(frame)) {
+        if (event == Event::kUnknownId) ++unknown[frame.msgid];
+        if (event == Event::kFrame) print_frame(frame, std::nullopt, options.json);
+      }
+    }
+  }
+  summarise("monitor", receiver.counters(), unknown);
+  const mavlink::Link::Counters& c = link.counters();
+  fmt::print(stderr, "{}: {} bytes in, {} out, opened {} times, lost {} times, {} datagrams of others\n",
+             options.url, c.bytes_in, c.bytes_out, c.opened, c.lost, c.foreign_datagrams);
+  return input::StopOnSignal::requested() ? kInterrupted : kDone;
+}
+
+void add_monitor(CLI::App& mavlink_app, std::function<int()>& run) {
+  const auto options = std::make_shared<MonitorOptions>();
+  CLI::App* command = mavlink_app.add_subcommand(
+      "monitor", "As decode, live from a link that is opened again whenever it is lost; counts at the end");
+  command->footer(
+      "URL: udpin://[HOST]:PORT (waits there), udpout://HOST:PORT, tcp://HOST:PORT, "
+      "serial:///dev/NAME:BAUD\n\n"
+      "Examples:\n"
+      "  roborun mavlink monitor udpin://:14550\n"
+      "  roborun mavlink monitor serial:///dev/ttyACM0:921600 --greet --json >messages.jsonl");
+  command->add_option("url", options->url, "The link: see below")->required();
+  command->add_flag("--json", options->json, "One JSON object per message");
+  command->add_flag(
+      "--greet", options->greet,
+      "Send the heartbeat of a ground station (255/190) each second: nothing else is ever sent");
+  command->add_option("--key", options->key,
+                      "File with the signing key, 64 hexadecimal digits: as of decode");
+  add_number(*command, "--seconds", options->seconds, 0.0, 1e9,
+             "End after this many seconds; default: at Ctrl-C");
+  command->callback([options, &run] { run = [options] { return monitor(*options); }; });
 }
 
 void add_decode(CLI::App& mavlink_app, std::function<int()>& run) {
@@ -197,10 +286,11 @@ void add_encode(CLI::App& mavlink_app, std::function<int()>& run) {
 }  // namespace
 
 void add_mavlink_command(CLI::App& app, std::function<int()>& run) {
-  CLI::App* mavlink_app = app.add_subcommand("mavlink", "MAVLink tools: decode, encode");
+  CLI::App* mavlink_app = app.add_subcommand("mavlink", "MAVLink tools: decode, encode, monitor");
   mavlink_app->require_subcommand(1);
   add_decode(*mavlink_app, run);
   add_encode(*mavlink_app, run);
+  add_monitor(*mavlink_app, run);
 }
 
 }  // namespace roborun::app

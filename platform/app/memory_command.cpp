@@ -83,7 +83,7 @@ void add_memory_command(CLI::App& app, std::function<int()>& run) {
                    "Vehicle: a shipped one (roborun vehicle list), or a vehicle file")
       ->capture_default_str();
   add_number(*command, "--fly", options->fly_s, 0.0, 7200.0,
-             "Fly for so many virtual seconds first, 0 .. 7200");
+             "Fly for this many virtual seconds first, 0 .. 7200");
   command->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
   command->callback([options, &run] { run = [options] { return memory(*options); }; });
 }

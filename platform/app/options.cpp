@@ -102,9 +102,12 @@ void refuse_before_subcommand(const CLI::App& app) {
 }
 
 std::string complaint_of(const CLI::App& app, const CLI::ParseError& error) {
-  const CLI::App& at = chosen(app);
+  // What is left over before the command: a mistyped one, whose subcommand has the name of a command.
+  const std::vector<std::string> before = app.remaining(false);
+  const bool is_mistyped = !before.empty() && !before.front().starts_with('-');
+  const CLI::App& at = is_mistyped ? app : chosen(app);
   const std::string help = fmt::format("(see {} --help)", path_of(at));
-  const std::vector<std::string> extras = app.remaining(true);
+  const std::vector<std::string> extras = is_mistyped ? before : app.remaining(true);
   if (extras.empty()) return fmt::format("{} {}", error.what(), help);
   std::string given = extras.front();
   std::vector<std::string> names;

@@ -1,8 +1,14 @@
 /// Options that every command reads in the same way.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <set>
 #include <string>
+#include <vector>
+
+#include "platform/input/input_error.hpp"
 
 namespace roborun::app {
 
@@ -16,6 +22,15 @@ CLI::Option* add_whole(CLI::App& app, const std::string& name, int& value, int l
 /// One that would be ignored. Throws InputError "OPTION: goes with PARTNER" if it was given although
 /// `with_partner` does not hold.
 void refuse_alone(const CLI::Option& option, bool with_partner, const std::string& partner);
+
+/// Throws InputError if a list has one value twice.
+template <typename T>
+void refuse_twice(const char* option, const std::vector<T>& values) {
+  std::set<T> seen;
+  for (const T& value : values) {
+    if (!seen.insert(value).second) throw InputError(fmt::format("{}: {} is given twice", option, value));
+  }
+}
 
 /// Throws InputError for an option of a command that has no say once its subcommand was chosen (`sweep --seeds
 /// 2 merge`).

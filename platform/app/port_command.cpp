@@ -1,9 +1,6 @@
 #include "platform/app/port_command.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -23,6 +20,8 @@
 #include "platform/input/input_error.hpp"
 #include "platform/input/stop_signal.hpp"
 #include "platform/sensor_port/port_devices.hpp"
+#include "platform/sensor_port/port_names.hpp"
+#include "platform/sensor_port/port_navigation.hpp"
 
 namespace roborun::app {
 namespace {
@@ -30,19 +29,9 @@ namespace {
 namespace sp = sensor_port;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kPortFolder = "/dev/shm";
-constexpr const char* kPortPrefix = "roborun-";
+using sp::is_written_to, sp::kPortFolder, sp::kPortPrefix, sp::port_path;
 
 MonotonicTime monotonic_now() { return MonotonicTime{std::chrono::steady_clock::now().time_since_epoch()}; }
-
-/// A writer holds the file's lock as long as it lives.
-bool is_written_to(const std::string& path) {
-  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return false;
-  const bool is_free = flock(file, LOCK_SH | LOCK_NB) == 0;
-  close(file);
-  return !is_free;
-}
 
 /// A port, read as the runtime reads it, and what was in its newest sample.
 class PortProbe {
@@ -84,6 +73,15 @@ std::string words_of(const firmware_if::OdometrySample& s) {
                      s.p_OB_m[2], s.sigma_position_m, s.reset_counter);
 }
 
+std::string words_of(const firmware_if::GnssFix& f) {
+  return fmt::format("({:.2f}, {:.2f}, {:.2f}) m from the first fix, within {:.2f} m, {}", f.p_WB_m[0],
+                     f.p_WB_m[1], f.p_WB_m[2], f.sigma_horizontal_m,
+                     std::isfinite(f.heading_rad) ? "with a heading" : "no heading");
+}
+std::string words_of(const firmware_if::BarometerSample& s) {
+  return fmt::format("{:+.2f} m since the first sample", s.altitude_m);
+}
+
 template <typename Device, typename Sample>
 class DeviceProbe final : public PortProbe {
  public:
@@ -103,7 +101,7 @@ class DeviceProbe final : public PortProbe {
   Device device_;
 };
 
-/// Kinds that no device of the runtime reads yet: the port's own rules alone.
+/// Kinds that say nothing on their own: the port's rules alone.
 class PlainProbe final : public PortProbe {
  public:
   std::string open(const std::string& path) { return reader_.open(path, 0); }
@@ -145,6 +143,10 @@ std::unique_ptr<PortProbe> open_port(const std::string& name) {
       return open_probe<DeviceProbe<sp::PortImu, firmware_if::ImuSample>>(path);
     case ROBORUN_PORT_ODOMETRY:
       return open_probe<DeviceProbe<sp::PortOdometry, firmware_if::OdometrySample>>(path);
+    case ROBORUN_PORT_GNSS:
+      return open_probe<DeviceProbe<sp::PortGnss, firmware_if::GnssFix>>(path);
+    case ROBORUN_PORT_PRESSURE:
+      return open_probe<DeviceProbe<sp::PortBarometer, firmware_if::BarometerSample>>(path);
     default:
       return plain;
   }
@@ -293,10 +295,6 @@ int check_ports(const std::vector<std::string>& names, double duration_s, bool j
 
 }  // namespace
 
-std::string port_path(const std::string& name) {
-  return name.find('/') == std::string::npos ? fmt::format("{}/{}{}", kPortFolder, kPortPrefix, name) : name;
-}
-
 void add_port_command(CLI::App& app, std::function<int()>& run) {
   struct PortOptions {
     std::string name;
@@ -315,15 +313,15 @@ void add_port_command(CLI::App& app, std::function<int()>& run) {
       "  roborun port check front");
   CLI::App* list_app =
       port_app->add_subcommand("list", "All ports of this machine, and whether a process writes to them");
-  list_app->add_flag("--json", options->json, "One object a port: port, device, written_to, reason");
+  list_app->add_flag("--json", options->json, "One object per port: port, device, written_to, reason");
   list_app->callback([options, &run] { run = [options] { return list_ports(options->json); }; });
 
   CLI::App* watch_app = port_app->add_subcommand("watch", "Rate, age and content of one port, once a second");
   watch_app->add_option("port", options->name, "NAME, or a file")->required();
   add_number(*watch_app, "--seconds", options->watch_s, 0.1, 1e9,
-             "Stop after so long; default: at Ctrl-C (exit code 130)")
+             "Stop after this many seconds; default: at Ctrl-C (exit code 130)")
       ->default_str("");
-  watch_app->add_flag("--json", options->json, "One object a second, with the counters since the start");
+  watch_app->add_flag("--json", options->json, "One object per second, with the counters since the start");
   watch_app->callback([options, &run] {
     run = [options] { return watch_port(options->name, options->watch_s, options->json); };
   });

@@ -2,155 +2,157 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <fnmatch.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
-#include <numeric>
 #include <thread>
 
 #include "platform/app/exit_code.hpp"
-#include "platform/evaluation/worker_processes.hpp"
+#include "platform/app/options.hpp"
+#include "platform/app/scenario_flights.hpp"
+#include "platform/app/scenario_matrix_command.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
-#include "platform/input/output_file.hpp"
-#include "platform/input/stop_signal.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/scenario_file.hpp"
-#include "platform/report/progress_line.hpp"
 #include "platform/report/svg.hpp"
-#include "platform/report/trace_csv.hpp"
 
 namespace roborun::app {
 namespace {
 
-using nlohmann::json;
 namespace fs = std::filesystem;
 
 struct ScenarioOptions {
   std::string path;
+  std::string filter;
+  std::string seed, seeds;
   std::string junit;
+  ScenarioOutputs outputs;
   std::string jobs{std::to_string(std::max(1U, std::thread::hardware_concurrency()))};
   bool json{false};
 };
 
-std::vector<std::string> files_of(const std::string& path) {
-  std::error_code error;
-  if (!fs::is_directory(path, error)) return {path};
+/// The scenarios of a folder; what is a TOML file and no scenario is named and left out.
+std::vector<std::string> scenarios_in(const std::string& folder) {
   std::vector<std::string> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(path)) {
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     if (entry.is_regular_file() && entry.path().extension() == ".toml")
       files.push_back(entry.path().string());
   }
-  if (files.empty()) throw InputError(fmt::format("{}: no scenario in it: must hold .toml files", path));
   std::sort(files.begin(), files.end());
+  std::erase_if(files, [](const std::string& file) {
+    const bool foreign = !mission::is_scenario(file);
+    if (foreign) fmt::print(stderr, "roborun: {}: skipped: no scenario (no [scenario] in it)\n", file);
+    return foreign;
+  });
+  if (files.empty())
+    throw InputError(fmt::format("{}: no scenario in it: must hold .toml files with [scenario]", folder));
   return files;
 }
 
-/// Everything that is told of one scenario: a pure function of its file.
-json verdict_of(const mission::Scenario& scenario) {
-  const report::MissionReport report = mission::fly_scenario(scenario);
-  json actions = json::array();
-  for (const report::FailsafeRecord& r : report.safety.actions) {
-    actions.push_back(
-        {{"time_s", r.time_s}, {"action", r.action}, {"phase", r.phase}, {"conditions", r.conditions}});
-    if (!r.sensor.empty()) actions.back()["sensor"] = r.sensor;
-  }
-  const std::vector<std::string> complaints = mission::complaints_of(scenario, report);
-  return {{"name", scenario.name},
-          {"about", scenario.about},
-          {"passed", complaints.empty()},
-          {"complaints", complaints},
-          {"outcome", report.result.reason},
-          {"actions", actions},
-          {"first_fault_s", report.safety.first_fault_s},
-          {"last_thrust_s", report.safety.last_thrust_s},
-          {"touchdown_mps", report.safety.touchdown_mps},
-          {"landing_site_known", report.safety.landing_site_was_known},
-          {"mission_time_s", report.result.mission_time_s},
-          {"goal_error_m", report.safety.goal_error_m},
-          {"state_hash", report.result.state_hash}};
+/// By the file's name without ending, with * and ?; several patterns with commas.
+void keep_matching(std::vector<std::string>& files, const std::string& filter, const std::string& path) {
+  if (filter.empty()) return;
+  const std::vector<std::string> patterns = input::split(filter);
+  std::erase_if(files, [&patterns](const std::string& file) {
+    const std::string name = fs::path(file).stem().string();
+    return std::none_of(patterns.begin(), patterns.end(), [&name](const std::string& pattern) {
+      return fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
+    });
+  });
+  if (files.empty())
+    throw InputError(
+        fmt::format("--filter: no scenario of {} is called '{}': must be names with * and ?, with "
+                    "commas between, as in 'gnss_*,kill_*'",
+                    path, filter));
 }
 
-std::string junit_of(const std::vector<json>& verdicts) {
+std::vector<std::string> files_of(const ScenarioOptions& options) {
+  std::error_code error;
+  std::vector<std::string> files{options.path};
+  if (fs::is_directory(options.path, error)) files = scenarios_in(options.path);
+  keep_matching(files, options.filter, options.path);
+  return files;
+}
+
+/// One for each scenario and seed.
+std::vector<ScenarioFlight> flights_of(const ScenarioOptions& options, std::vector<std::string>& inputs) {
+  const std::vector<std::uint64_t> seeds = seeds_of(options.seed, options.seeds);
+  std::vector<ScenarioFlight> flights;
+  // Every file is checked before the first one is flown.
+  for (const std::string& file : files_of(options)) {
+    const mission::Scenario scenario = mission::load_scenario(file);
+    inputs.push_back(file);
+    inputs.insert(inputs.end(), scenario.files.begin(), scenario.files.end());
+    const auto add = [&](const mission::Scenario& s, const std::string& stem, const std::string& seed) {
+      const std::string trace = stem + ".csv";
+      flights.push_back(
+          {s, stem,
+           fmt::format("roborun scenario run {}{} --trace {} --plot {}", input::shell_word(file), seed,
+                       input::shell_word(trace), input::shell_word(stem + ".svg")),
+           trace});
+    };
+    if (seeds.empty()) add(scenario, scenario.name, "");
+    for (const std::uint64_t seed : seeds) {
+      mission::Scenario s = scenario;
+      s.config.seed = seed;
+      s.name = fmt::format("{} seed {}", scenario.name, seed);
+      add(s, fmt::format("{}_seed_{}", scenario.name, seed), fmt::format(" --seed {}", seed));
+    }
+  }
+  return flights;
+}
+
+/// Text, reasons and files of every flight; attachments in the way in which Jenkins and GitLab find them.
+std::string junit_of(const std::vector<nlohmann::json>& verdicts) {
   const auto failed =
-      std::count_if(verdicts.begin(), verdicts.end(), [](const json& v) { return !v["passed"]; });
+      std::count_if(verdicts.begin(), verdicts.end(), [](const nlohmann::json& v) { return !v["passed"]; });
   double total_s = 0.0;
-  for (const json& v : verdicts) total_s += v["mission_time_s"].get<double>();
+  for (const nlohmann::json& v : verdicts) total_s += v["mission_time_s"].get<double>();
   std::string xml = fmt::format(
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuite name=\"roborun scenario\" tests=\"{}\" "
       "failures=\"{}\" time=\"{:.3f}\">\n",
       verdicts.size(), failed, total_s);
-  for (const json& v : verdicts) {
-    xml += fmt::format("  <testcase classname=\"scenario\" name=\"{}\" time=\"{:.3f}\"",
+  const auto lines = [](const std::string& text) {  // the escape makes spaces of line ends
+    std::string escaped;
+    std::size_t at = 0;
+    for (std::size_t end = text.find('\n'); end != std::string::npos; at = end + 1, end = text.find('\n', at))
+      escaped += report::xml_escape(text.substr(at, end - at)) + "\n";
+    return escaped + report::xml_escape(text.substr(at));
+  };
+  for (const nlohmann::json& v : verdicts) {
+    xml += fmt::format("  <testcase classname=\"scenario\" name=\"{}\" time=\"{:.3f}\">\n",
                        report::xml_escape(v["name"]), v["mission_time_s"].get<double>());
-    if (v["passed"]) {
-      xml += "/>\n";
-      continue;
-    }
     const auto complaints = v["complaints"].get<std::vector<std::string>>();
-    xml += fmt::format(">\n    <failure message=\"{}\"/>\n  </testcase>\n",
-                       report::xml_escape(fmt::format("{}", fmt::join(complaints, "; "))));
+    if (!complaints.empty())
+      xml += fmt::format("    <failure message=\"{}\">{}</failure>\n", report::xml_escape(complaints.front()),
+                         lines(fmt::format("{}", fmt::join(complaints, "\n"))));
+    std::string output = fmt::format("{}\n{}", v["about"].get<std::string>(), text_of_verdict(v));
+    for (const nlohmann::json& file : v["files"])
+      output += fmt::format("[[ATTACHMENT|{}]]\n", fs::absolute(file.get<std::string>()).string());
+    xml += fmt::format("    <system-out>{}</system-out>\n  </testcase>\n", lines(output));
   }
   return xml + "</testsuite>\n";
 }
 
-void tell(const json& v) {
-  std::vector<std::string> actions;
-  for (const json& a : v["actions"]) actions.push_back(a["action"]);
-  fmt::print("{}  {:<34} {:<12} {:6.1f} s  {}\n", v["passed"] ? "pass" : "FAIL", v["name"].get<std::string>(),
-             v["outcome"].get<std::string>(), v["mission_time_s"].get<double>(), fmt::join(actions, " > "));
-  for (const json& c : v["complaints"]) fmt::print("      {}\n", c.get<std::string>());
-}
-
 int run_scenarios(const ScenarioOptions& options) {
   const int jobs = input::jobs_of(options.jobs);
-  // Every file is checked before the first one is flown.
-  std::vector<mission::Scenario> scenarios;
   std::vector<std::string> inputs;
-  for (const std::string& file : files_of(options.path)) {
-    scenarios.push_back(mission::load_scenario(file));
-    inputs.push_back(file);
-    inputs.insert(inputs.end(), scenarios.back().files.begin(), scenarios.back().files.end());
-  }
-  input::check_outputs({{"--junit", options.junit}}, inputs);
-
-  std::vector<json> verdicts(scenarios.size());
-  std::vector<std::size_t> tasks(scenarios.size());
-  std::iota(tasks.begin(), tasks.end(), std::size_t{0});
-  std::size_t done = 0;
-  std::size_t failed = 0;
-  const input::StopOnSignal stop;
-  report::ProgressLine line;
-  evaluation::WorkerCalls calls;
-  calls.work = [&](std::size_t i) {
-    return verdict_of(scenarios[i]).dump(-1, ' ', false, json::error_handler_t::replace);
-  };
-  calls.answered = [&](std::size_t i, const std::string& answer) {
-    verdicts[i] = json::parse(answer);
-    ++done;
-    failed += verdicts[i]["passed"] ? 0U : 1U;
-    if (line.due()) line.show(fmt::format("{} of {} scenarios flown", done, scenarios.size()));
-  };
-  calls.died = [&](std::size_t i) {
-    throw InputError(fmt::format("{}: the flight's process died", scenarios[i].name));
-  };
-  calls.go_on = [] { return !input::StopOnSignal::requested(); };
-  if (!evaluation::run_in_processes(tasks, jobs, calls))
-    throw input::Interrupted(fmt::format("{} of {} scenarios flown, {} of them failed; no file was written",
-                                         done, scenarios.size(), failed));
-
-  for (const json& v : verdicts) {
-    if (options.json)
-      fmt::print("{}\n", v.dump());
-    else
-      tell(v);
-  }
-  if (!options.json) fmt::print("{} of {} passed\n", verdicts.size() - failed, verdicts.size());
+  const std::vector<ScenarioFlight> flights = flights_of(options, inputs);
+  check_scenario_outputs(flights, options.outputs, options.junit, inputs);
+  const std::vector<nlohmann::json> verdicts =
+      fly_scenarios(flights, options.outputs, jobs, [&options](const nlohmann::json& v) {
+        print_now(options.json ? v.dump() + "\n" : text_of_verdict(v));
+      });
+  const auto passed =
+      std::count_if(verdicts.begin(), verdicts.end(), [](const nlohmann::json& v) { return v["passed"]; });
+  if (!options.json) fmt::print("{} of {} passed\n", passed, verdicts.size());
   if (!options.junit.empty()) input::write_file(options.junit, junit_of(verdicts));
-  return failed == 0 ? kDone : kNotGood;
+  refuse_lost_logs(verdicts);
+  return static_cast<std::size_t>(passed) == verdicts.size() ? kDone : kNotGood;
 }
 
 }  // namespace
@@ -160,17 +162,24 @@ void add_scenario_command(CLI::App& app, std::function<int()>& run) {
   CLI::App* scenario_app =
       app.add_subcommand("scenario", "Fly scenarios with faults from files, and judge each flight");
   scenario_app->require_subcommand(1);
-  CLI::App* run_app = scenario_app->add_subcommand("run", "Fly one file, or every .toml file of a folder");
+  add_scenario_matrix_command(*scenario_app, run);
+  CLI::App* run_app = scenario_app->add_subcommand("run", "Fly one file, or every scenario of a folder");
   run_app->footer(
       "Examples:\n"
       "  roborun scenario run platform/sitl/scenarios                 the library\n"
       "  roborun scenario run platform/sitl/scenarios/gnss_off.toml\n"
-      "  roborun scenario run my_scenarios --junit out/junit.xml --jobs 4\n\n"
+      "  roborun scenario run my_scenarios --junit out/junit.xml --jobs 4\n"
+      "  roborun scenario run my_scenarios --filter 'gnss_*,kill_*' --seeds 1,2,3 --out out/failed\n"
+      "  roborun scenario run my_scenarios/fog.toml --seed 3 --trace fog.csv --plot fog.svg\n\n"
+      "Each verdict is printed as it falls. One that fails says every condition that did not hold: its value "
+      "and when,\nwhat it had to be, and why; and the commands that look into it. TOML files of a folder "
+      "without [scenario] are\nnamed and skipped.\n\n"
       "A scenario:\n"
       "  [scenario]\n"
       "  about = \"Satellite navigation is lost in cruise: it lands\"\n"
       "  world = \"worlds/yard.toml\"      # relative to this file; or environment = \"14\"\n"
-      "  seed = 1                        # design = \"aware\", cost_factor = 1; [camera] [wind] [fog] "
+      "  seed = 1                        # design = \"aware\", cost_factor = 1, autopilot = \"px4\" or "
+      "\"arducopter\"; [camera] [wind] [fog] "
       "[battery] [flight] "
       "[cpu]\n"
       "  [fence]                         # [fence] as in a settings file: platform/README.md\n"
@@ -200,9 +209,24 @@ void add_scenario_command(CLI::App& app, std::function<int()>& run) {
       "landing_site_known, sensor\n\n"
       "Exit code: 0 all passed, 1 at least one failed (its line says why), 2 bad input.");
   run_app->add_option("path", options->path, "A scenario file, or a folder of them")->required();
-  run_app->add_option("--junit", options->junit, "Write the verdicts to this file as JUnit XML");
+  run_app->add_option("--filter", options->filter,
+                      "Only scenarios of these names (* and ? as in a shell), with commas [all]");
+  CLI::Option* seed =
+      run_app->add_option("--seed", options->seed, "In the place of every scenario's own seed");
+  run_app->add_option("--seeds", options->seeds, "Each scenario once with each of these, with commas")
+      ->excludes(seed);
+  run_app->add_option("--trace", options->outputs.trace,
+                      "Write every decision to this CSV file (one scenario, one seed)");
+  run_app->add_option("--plot", options->outputs.plot,
+                      "Write a picture of the flight to this SVG file (one scenario, one seed)");
+  run_app->add_option("--log", options->outputs.log,
+                      "Write what the flight read, did and why to this MCAP file (one scenario, one seed)");
+  run_app->add_option("--out", options->outputs.folder,
+                      "Folder for trace, picture and log of every flight that fails: NAME.csv, .svg, .mcap");
+  run_app->add_option("--junit", options->junit,
+                      "Write the verdicts to this file as JUnit XML, with text, reasons and files");
   run_app->add_option("--jobs", options->jobs, "Flights at a time, 1 .. 1024")->capture_default_str();
-  run_app->add_flag("--json", options->json, "One JSON object a scenario on standard output, nothing else");
+  run_app->add_flag("--json", options->json, "One JSON object per flight on standard output, nothing else");
   run_app->callback([options, &run] { run = [options] { return run_scenarios(*options); }; });
 }
 

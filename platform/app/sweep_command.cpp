@@ -49,14 +49,6 @@ struct SweepOptions {
   std::vector<std::string> merged;
 };
 
-template <typename T>
-void refuse_twice(const char* option, const std::vector<T>& values) {
-  std::set<T> seen;
-  for (const T& value : values) {
-    if (!seen.insert(value).second) throw InputError(fmt::format("{}: {} is given twice", option, value));
-  }
-}
-
 std::string profile_digest(const board::Profile& profile) {
   core::StateHash hash;
   for (const core::StageCost& cost : profile.costs.stage) {
@@ -327,7 +319,8 @@ void add_sweep_command(CLI::App& app, std::function<int()>& run) {
       "Suite hard makes its worlds from the seed. Suite foreign flies files of MIGHTY, FASTER and ETH "
       "(platform/sitl/README.md);\n"
       "seed N takes the N-th pair of start and goal that a world has, and begins again after the last.\n\n"
-      "The folder --out holds request.json, results.jsonl (one line a mission) and report.html (tables and\n"
+      "The folder --out holds request.json, results.jsonl (one line per mission) and report.html (tables "
+      "and\n"
       "pictures, opens offline). Stopped by Ctrl-C or power loss, the same command goes on. Results do not\n"
       "depend on --jobs, machine or order. A folder holds the flights of one commit: another one is "
       "refused.\n"

@@ -30,13 +30,23 @@ std::optional<std::array<double, count>> numbers(const char* option, const std::
   return values;
 }
 
+}  // namespace
+
 std::optional<Vector3> point_of(const char* option, const std::string& text) {
   const auto p = numbers<3>(option, text, "a point: must be X,Y,Z in metres");
   if (!p) return std::nullopt;
   return Vector3((*p)[0], (*p)[1], (*p)[2]);
 }
 
-}  // namespace
+std::optional<Aabb> box_of(const char* option, const std::string& text) {
+  const auto b = numbers<6>(option, text, "a box: must be X,Y,Z,X,Y,Z in metres");
+  if (!b) return std::nullopt;
+  const Aabb box{{(*b)[0], (*b)[1], (*b)[2]}, {(*b)[3], (*b)[4], (*b)[5]}};
+  if (!(box.size().minCoeff() > 0.0))
+    throw InputError(
+        fmt::format("{}: '{}': the second corner must be above the first on every axis", option, text));
+  return box;
+}
 
 void add_world_arguments(CLI::App& command, WorldArguments& arguments) {
   command.add_option("--start", arguments.start, "With a world from a file: X,Y,Z in metres");
@@ -70,12 +80,7 @@ sitl::WorldOptions world_options(const WorldArguments& arguments, double radius_
   options.start_W = point_of("--start", arguments.start);
   if (const std::vector<Vector3> goals_W = goals_of(arguments); !goals_W.empty())
     options.goal_W = goals_W.front();
-  if (const auto b = numbers<6>("--bounds", arguments.bounds, "a box: must be X,Y,Z,X,Y,Z in metres")) {
-    options.bounds_W = Aabb{{(*b)[0], (*b)[1], (*b)[2]}, {(*b)[3], (*b)[4], (*b)[5]}};
-    if (!(options.bounds_W->size().minCoeff() > 0.0))
-      throw InputError(fmt::format("--bounds: '{}': the second corner must be above the first on every axis",
-                                   arguments.bounds));
-  }
+  options.bounds_W = box_of("--bounds", arguments.bounds);
   if (const auto z = numbers<1>("--ground", arguments.ground, "a height in metres"))
     options.ground_m = (*z)[0];
   if (const auto cell = numbers<1>("--cell", arguments.cell, "a size in metres")) options.cell_m = (*cell)[0];

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,9 @@ struct WorldArguments {
   bool surfaces{false};
 };
 
+/// X,Y,Z and X,Y,Z,X,Y,Z; none for an empty text. Throw InputError that names the option.
+[[nodiscard]] std::optional<Vector3> point_of(const char* option, const std::string& text);
+[[nodiscard]] std::optional<Aabb> box_of(const char* option, const std::string& text);
 /// Every --goal, in order. Throws InputError for one that is no point.
 [[nodiscard]] std::vector<Vector3> goals_of(const WorldArguments& arguments);
 /// Adds --start, --goal, --bounds, --ground, --cell, --scale and --surfaces. `arguments` must outlive the command.

@@ -44,7 +44,7 @@ struct BoardSweep {
 };
 
 /// Runs map, export and planner at 6 precisions x 8 volumes from 4 poses of environment 14, `repeats` times
-/// each (25 make 100 samples a point), with `backends`. Times are those of the thread: what other programs
+/// each (25 make 100 samples per point), with `backends`. Times are those of the thread: what other programs
 /// take is not counted, as a flight lane has its CPU to itself. Every third volume is held out. `progress`
 /// (may be empty) gets 0 .. 1.
 [[nodiscard]] BoardProfile measure_board(const BackendNames& backends, int repeats,

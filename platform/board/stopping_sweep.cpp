@@ -41,7 +41,8 @@ double stopping_distance_m(double speed_mps, std::uint64_t seed) {
   while (now < begin) step();
   Trajectory brake;
   const stages::Smoother smoother;
-  if (smoother.brake(cruise.at(begin), begin, {30.0, VehicleModel{}.acceleration_mps2}, brake) != Status::kOk)
+  const auto [acceleration_mps2, jerk_mps3] = followed_limits(VehicleModel{});
+  if (smoother.brake(cruise.at(begin), begin, {30.0, acceleration_mps2, jerk_mps3}, brake) != Status::kOk)
     return 0.0;
   lane.offer(brake);
   const Vector3 at_W = vehicle.state().p_WB;

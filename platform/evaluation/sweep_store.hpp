@@ -1,4 +1,4 @@
-/// The folder of a sweep: request.json (the plan), results.jsonl (one line a mission),
+/// The folder of a sweep: request.json (the plan), results.jsonl (one line per mission),
 /// flight_DESIGN_SEED.json (of the representative environment). What was written survives Ctrl-C and power
 /// loss; a half line at the end does not count.
 #pragma once

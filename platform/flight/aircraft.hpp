@@ -1,6 +1,7 @@
 /// What the flight lane reads and commands, whoever is behind it: a simulation, or the recording of one.
 #pragma once
 
+#include "firmware_if/autopilot.hpp"
 #include "firmware_if/barometer.hpp"
 #include "firmware_if/gnss.hpp"
 #include "firmware_if/imu.hpp"
@@ -33,8 +34,13 @@ class Aircraft {
   /// Null: it has none.
   [[nodiscard]] virtual firmware_if::Odometry* odometry() noexcept { return nullptr; }
   [[nodiscard]] virtual firmware_if::Motors& motors() noexcept = 0;
+  /// Null: the runtime itself flies it. Else the autopilot does: its state is the state, it gets set-points, and sensors and
+  /// motors above are not asked. begin_frame() brings it what has come, end_frame() takes away what is to be sent; the flight
+  /// lane steps it.
+  [[nodiscard]] virtual firmware_if::Autopilot* autopilot() noexcept { return nullptr; }
   [[nodiscard]] virtual AircraftHealth health(MonotonicTime now) noexcept = 0;
-  /// Motors off for good, whatever is commanded from here on: by the runtime itself, and after a landing.
+  /// Motors off for good, whatever is commanded from here on: by the runtime itself, and after a landing. Motors of an
+  /// autopilot stop if it obeys.
   virtual void terminate() noexcept = 0;
   virtual void disarm() noexcept = 0;
   /// What was commanded leaves.

@@ -5,6 +5,7 @@
 
 #include "core/memory/static_vector.hpp"
 #include "platform/flight/flight_config.hpp"
+#include "platform/flight/rest_of_budget.hpp"
 #include "stages/perception/polled_view.hpp"
 #include "stages/planning/fenced_view.hpp"
 #include "stages/planning/way_out.hpp"
@@ -19,6 +20,7 @@ constexpr double kAtRest_mps = 0.05;
 constexpr double kLeaving_mps = 0.5;
 constexpr double kTooFast = 1.5;
 constexpr double kReserve = 1.25;  // of the time for planner and smoother, see hasten()
+constexpr double kSearches = 3.0;  // of find_trajectory(), one of which is predicted
 constexpr int kSpareFrames = 4;
 constexpr double kSlowEnough = 1.05;  // of the slow speed: what trajectories keep to
 /// So many pixels of a decision's images show something thin where poles or wires are: 40 to 900 in worlds of them. In environment
@@ -90,6 +92,19 @@ DecisionPipeline::DecisionPipeline(const PipelineConfig& config, core::StageMete
   cloud_.set_height_limits(config.map_bounds_W.min_W.z(), config.map_bounds_W.max_W.z());
 }
 
+stages::MotionLimits DecisionPipeline::limits(double speed_mps) const noexcept {
+  constexpr double kVertical_mps2 = 4.5;  // the tracker asks for 4.9 downwards, 5.9 upwards at most
+  const VehicleModel& v = config_.vehicle;
+  const auto [acceleration_mps2, jerk_mps3] = followed_limits(v);
+  return {speed_mps,
+          acceleration_mps2,
+          jerk_mps3,
+          v.climb_mps,
+          v.descent_mps,
+          kVertical_mps2,
+          speeding_up_mps2(v, speed_mps)};
+}
+
 void DecisionPipeline::charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept {
   meter_.charge_to(id);
   out.work[id] = work;
@@ -101,6 +116,8 @@ core::MeteredBudget DecisionPipeline::budget_of(core::StageId id, const Decision
   Nanos rest = out.decision.point.deadline - out.latency;
   for (std::size_t later = static_cast<std::size_t>(id) + 1; later < core::kStageCount; ++later)
     rest -= from_seconds(out.decision.predicted_s[later]);
+  // A search ends up to a poll after its budget, and fast smoothers are predicted to take nothing.
+  if (id == core::StageId::kPlanner) rest -= config_.minor_frame;
   return {meter_, id, meter_.grant(id, rest)};
 }
 
@@ -119,6 +136,7 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   need.reach_m = std::fmax(need.reach_m, MotionWatch::kReach_m);
   (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), need, budget, work);
   motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W}, cloud_.points(), map_.view(), budget, work);
+  bodies_.observe(in.now, motion_.appeared_W());
   out.motion = motion_.moving(in.now);
   // Where views leave gaps a coarse cell is rarely seen whole: in such cells nothing were visible, the governor would hurry,
   // choose coarser ones, and see as little again.
@@ -198,7 +216,10 @@ void DecisionPipeline::check_committed(const DecisionInput& in, DecisionOutput& 
   const double until_s = free_until_s(polled, *in.committed, from_s, config_.vehicle.radius_m, work.units);
   // Where something moves, what is fast now is not flown on until a slower plan is there.
   const bool too_fast = out.motion && in.v_WB.norm() > kTooFast * out.decision.point.speed_limit_mps;
-  if (std::isinf(until_s) && !too_fast) return;
+  if (std::isinf(until_s) && !too_fast) {
+    out.early_stop = stop_before_body(in, known.view(), work, out.latency);
+    return;
+  }
   const MonotonicTime free_until =
       std::isinf(until_s) ? MonotonicTime::max() : in.committed->start_time + from_seconds(until_s);
   out.early_stop = stop_before(in, free_until, known.view(), work, out.latency);
@@ -227,20 +248,26 @@ void DecisionPipeline::export_map(const DecisionInput& in, DecisionOutput& out) 
 }
 
 void DecisionPipeline::search(const DecisionInput& in, double radius_m, DecisionOutput& out) noexcept {
+  search_to(in.goal_W, in, radius_m, out);
+}
+
+void DecisionPipeline::search_to(const Vector3& goal_W, const DecisionInput& in, double radius_m,
+                                 DecisionOutput& out) noexcept {
   const Permitted permitted(*this);
   stages::PlanRequest request;
   request.start_W = draft_.start.p_W;
-  request.goal_W = in.goal_W;
+  request.goal_W = goal_W;
   request.bounds_W = config_.flight_bounds_W;
   request.radius_m = radius_m;
   request.volume_m3 = std::max(out.decision.point.v2_m3 - draft_.planner_work.volume_m3, 0.0);
   request.horizon_m = config_.horizon_m;
   request.kept_W = kept_W_;
-  request.ways = ways_known_ ? ways_ : nullptr;
+  request.ways = ways_known_ && goal_W == in.goal_W ? ways_ : nullptr;
   request.seed = in.seed;
   meter_.charge_to(core::StageId::kPlanner);
   stages::PlanResult planned;
-  out.planner_status = planner_.plan(request, permitted.view(), *draft_.planner_budget, planned);
+  RestOfBudget rest(*draft_.planner_budget, draft_.planner_work);
+  out.planner_status = planner_.plan(request, permitted.view(), rest, planned);
   draft_.planner_work.units += planned.work.units;
   draft_.planner_work.volume_m3 += planned.work.volume_m3;
   kept_W_ = planned.path_W;
@@ -258,9 +285,20 @@ void DecisionPipeline::fit(core::StageBudget& budget, double radius_m, double sp
   request.radius_m = radius_m;
   meter_.charge_to(core::StageId::kSmoother);
   stages::SmoothResult smoothed;
-  out.smoother_status = smoother_.smooth(request, permitted.view(), budget, smoothed);
-  draft_.smoother_work.units += smoothed.work.units;
-  if (out.smoother_status == Status::kOk) draft_.trajectory = smoothed.trajectory;
+  constexpr int kSlower = 3;
+  constexpr double kRatio = 0.7;
+  for (int round = 0; round <= kSlower; ++round) {
+    RestOfBudget rest(budget, draft_.smoother_work);
+    const Status status = smoother_.smooth(request, permitted.view(), rest, smoothed);
+    draft_.smoother_work.units += smoothed.work.units;
+    if (round == 0 || status == Status::kOk) out.smoother_status = status;
+    if (status != Status::kOk) return;
+    draft_.trajectory = smoothed.trajectory;
+    if (!config_.stops_straight ||
+        stops_free(draft_.trajectory, stages::FinestView(permitted.view()), draft_.smoother_work))
+      return;
+    request.limits = limits(speed_mps *= kRatio);
+  }
 }
 
 void DecisionPipeline::leave(core::StageBudget& budget, DecisionOutput& out) noexcept {
@@ -282,8 +320,8 @@ void DecisionPipeline::leave(core::StageBudget& budget, DecisionOutput& out) noe
 
 void DecisionPipeline::hasten(const DecisionInput& in, DecisionOutput& out) const noexcept {
   if (in.climbing || out.decision.source == governor::BudgetSource::kFixed) return;
-  const double left_s =
-      out.decision.predicted_s[core::StageId::kPlanner] + out.decision.predicted_s[core::StageId::kSmoother];
+  const double left_s = kSearches * out.decision.predicted_s[core::StageId::kPlanner] +
+                        out.decision.predicted_s[core::StageId::kSmoother];
   const Nanos needed = out.latency + from_seconds(kReserve * left_s);
   const Nanos whole = config_.minor_frame * (needed / config_.minor_frame + kSpareFrames);
   const MonotonicTime stands = in.committed->start_time + from_seconds(in.committed->duration_s());
@@ -297,11 +335,15 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   draft_.takes_over = in.now + out.decision.point.deadline;
   const MonotonicTime ends = in.committed->start_time + from_seconds(in.committed->duration_s());
   if (in.climbing && draft_.takes_over < ends) return;
+  if (in.now < back_until_) {
+    out.planner_status = out.smoother_status = Status::kOk;  // of what is flown
+    return;
+  }
   draft_.begun = true;
   draft_.start = in.committed->at(draft_.takes_over);
   draft_.planner_work = out.work[core::StageId::kPlanner];
   draft_.smoother_work = {};
-  draft_.leaves = draft_.is_narrow = false;
+  draft_.leaves = draft_.is_narrow = draft_.replaces = draft_.keeps = false;
   const Known known(*this, in);
   draft_.committed_until_s =
       free_until_s(known.view(), *in.committed, seconds(in.now - in.committed->start_time),
@@ -336,10 +378,13 @@ void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noex
   if (draft_.begun) {
     core::MeteredBudget budget = table_budget_of(core::StageId::kSmoother);
     find_trajectory(in, budget, out);
+    if (config_.turns) look_on(in, budget, out);
+    give_way(in, budget, out);
     charge(core::StageId::kPlanner, draft_.planner_work, out);
     charge(core::StageId::kSmoother, draft_.smoother_work, out);
     choose(in, out);
   }
+  out.look_W = look_W_;
   for (std::size_t i = 0; i < core::kStageCount; ++i) {
     const auto stage = static_cast<core::StageId>(i);
     policy_.observe(stage, out.decision.predicted_s[i], seconds(out.cost[i]));
@@ -385,15 +430,16 @@ void DecisionPipeline::find_trajectory(const DecisionInput& in, core::StageBudge
 }
 
 void DecisionPipeline::choose(const DecisionInput& in, DecisionOutput& out) noexcept {
-  // A new trajectory begins slowly and another one may be there next time: what is flown now is kept as long
-  // as it is free, has not begun to brake and arrives no later.
+  // What is flown now is kept as long as it is free, arrives no later, and does not begin to brake before the next
+  // decision can replace it.
   const bool is_free = std::isinf(draft_.committed_until_s);
   const bool has_new = out.smoother_status == Status::kOk;
   const MonotonicTime brakes = in.committed->start_time + from_seconds(in.committed->brake_begin_s);
-  const bool keeps = is_free && draft_.start.v_W.norm() < 1.1 * out.decision.point.speed_limit_mps &&
-                     draft_.takes_over < brakes && has_new &&
+  const bool keeps = is_free && !draft_.replaces &&
+                     draft_.start.v_W.norm() < 1.1 * out.decision.point.speed_limit_mps &&
+                     draft_.takes_over + out.decision.point.deadline < brakes && has_new &&
                      arrival_s(*in.committed, in) <= arrival_s(draft_.trajectory, in);
-  if (has_new && !keeps) {
+  if (has_new && !keeps && !(is_free && draft_.keeps)) {
     has_planned_ = true;
     is_narrow_ = draft_.is_narrow;
     if (draft_.leaves) leaves_at_ = draft_.trajectory.start_time;
@@ -414,8 +460,10 @@ void DecisionPipeline::forget() noexcept {
   map_.forget();
   if (ways_ != nullptr) ways_->forget();
   motion_ = {};
+  bodies_ = {};
   thin_until_ = {};
   kept_W_.clear();
+  look_W_.reset();
   has_planned_ = false;
 }
 

@@ -17,6 +17,7 @@
 #include "core/trajectory.hpp"
 #include "core/vehicle_model.hpp"
 #include "governor/policy/decision_policy.hpp"
+#include "platform/flight/body_tracks.hpp"
 #include "platform/flight/motion_watch.hpp"
 #include "stages/perception/cloud_images.hpp"
 #include "stages/perception/occupancy_map.hpp"
@@ -33,12 +34,14 @@ struct PipelineConfig {
   VehicleModel vehicle{};
   /// The sensors together see every direction; false: what they do not see may be anything.
   bool sees_all_around{true};
+  bool turns{};                  ///< GazeConfig::follows: it sees where it looks.
   double level_view_ratio{1.0};  ///< FlightConfig::level_view_ratio.
   double too_near_m{};           ///< FlightConfig::too_near_m.
   PrecisionLattice lattice{};
   double horizon_m{24.0};  ///< No way-point farther than this: one metre less than the cameras see.
   core::Fence fence{};     ///< What it forbids is occupied for planner and smoother.
   Nanos minor_frame{core::kMinorFrame};  ///< Of the flight lane: no stop takes over sooner.
+  bool stops_straight{};                 ///< FlightConfig::stops_straight.
   Aabb map_bounds_W{};  ///< What the map stores; its heights limit what counts as seen volume.
 };
 
@@ -81,8 +84,9 @@ struct DecisionOutput {
       Status::kNotReady};  ///< Of Ways::look() or solve(); kNotReady: nothing remembers ways here.
   double
       way_m{};  ///< Length of the way to the goal if ways_status is kOk: what is unknown on it counts kUnknownWeight times.
-  bool motion{};    ///< Something was seen to move nearby, not long ago.
-  Nanos latency{};  ///< Sum of the costs: when the result is there, counted from input.now.
+  bool motion{};                    ///< Something was seen to move nearby, not long ago.
+  std::optional<Vector3> look_W{};  ///< DecisionReport::look_W.
+  Nanos latency{};                  ///< Sum of the costs: when the result is there, counted from input.now.
 };
 
 /// Runs the stages in the order of the frame table, each under the budget that the governor granted it.
@@ -109,11 +113,8 @@ class DecisionPipeline {
   [[nodiscard]] double radius_m() const noexcept { return planned_radius_m(config_.vehicle); }
 
  private:
-  /// The vehicle's limits, at this speed.
-  [[nodiscard]] stages::MotionLimits limits(double speed_mps) const noexcept {
-    const VehicleModel& v = config_.vehicle;
-    return {speed_mps, v.acceleration_mps2, v.jerk_mps3, v.climb_mps, v.descent_mps};
-  }
+  /// The vehicle's limits, at this speed, and what it can follow of them.
+  [[nodiscard]] stages::MotionLimits limits(double speed_mps) const noexcept;
   /// The map, with the fence around it: what is planned in.
   class Permitted;
   /// The same at its finest: what is flown is checked in it. While the vehicle leaves a place
@@ -130,6 +131,8 @@ class DecisionPipeline {
     Trajectory trajectory{};
     bool is_narrow{};  ///< With the room of slow flight.
     bool leaves{};     ///< The trajectory leaves a place without room.
+    bool replaces{};   ///< What is flown meets a body, the trajectory later or not at all.
+    bool keeps{};      ///< Nothing is better than what is flown: it meets a body latest.
   };
 
   void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
@@ -157,8 +160,14 @@ class DecisionPipeline {
   [[nodiscard]] double arrival_s(const Trajectory& trajectory, const DecisionInput& in) const noexcept;
   /// One search, with this radius kept free; the path goes to kept_W_.
   void search(const DecisionInput& in, double radius_m, DecisionOutput& out) noexcept;
+  /// The same to another place than the goal.
+  void search_to(const Vector3& goal_W, const DecisionInput& in, double radius_m,
+                 DecisionOutput& out) noexcept;
   /// The path of the last search as a trajectory.
   void fit(core::StageBudget& budget, double radius_m, double speed_mps, DecisionOutput& out) noexcept;
+  /// From everywhere on it the vehicle may stop straight on, as far as its stopping model says.
+  [[nodiscard]] bool stops_free(const Trajectory& trajectory, const stages::MapView& view,
+                                core::Work& work) const noexcept;
   /// Slow enough for the room of slow flight, if that is less.
   [[nodiscard]] bool may_squeeze() const noexcept;
   /// The path of the last search, slowly and with the room that this takes.
@@ -167,6 +176,20 @@ class DecisionPipeline {
   void find_trajectory(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// From rest, out of where no search has room: slowly, with the vehicle's own radius.
   void leave(core::StageBudget& budget, DecisionOutput& out) noexcept;
+  /// Of a vehicle that turns: where no way is found, it looks at what is unknown on the way, and after a while from farther
+  /// off: what is near, above and below its view is never seen from there.
+  void look_on(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
+  /// The first unknown place on the way to the goal.
+  [[nodiscard]] Vector3 undecided_W(const DecisionInput& in) const noexcept;
+  /// Where what was found meets a body that moves: slower, a stop, or to the side, whatever meets none, or the latest.
+  void give_way(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
+  /// Aside, a few metres in eight directions: the one that meets nothing and ends nearest to the goal. `best_s` is when what
+  /// is best so far meets a body.
+  void dodge(const DecisionInput& in, core::StageBudget& budget, double& best_s, Trajectory& best) noexcept;
+  /// A stop instead of what is flown, if that meets a body before it could stop and the stop meets one later.
+  [[nodiscard]] std::optional<Trajectory> stop_before_body(const DecisionInput& in,
+                                                           const stages::MapView& known, core::Work& work,
+                                                           Nanos latency) const noexcept;
   /// Between the new trajectory, what is flown, and a stop.
   void choose(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// What is left of the deadline for this stage, when the stages after it get what was predicted for them.
@@ -185,13 +208,17 @@ class DecisionPipeline {
   bool ways_known_{false};  ///< In this decision.
   stages::Path kept_W_;     ///< What was planned last.
   MotionWatch motion_;
+  BodyTracks bodies_;
   bool has_planned_{false};  ///< A plan was found since the take-off.
   MonotonicTime leaves_at_ =
       MonotonicTime::min();  ///< Start of the last trajectory that leaves a place without room.
   Draft draft_;
-  MonotonicTime thin_until_{};  ///< Something thin was seen less than kThinLasts before.
-  bool is_narrow_{false};       ///< What is flown was planned so.
-  int failures_{0};             ///< Decisions in a row without a trajectory.
+  std::optional<Vector3> look_W_{};  ///< What it looks at while it stands without a way, or steps back.
+  MonotonicTime blocked_since_{};    ///< Standing without a way, and the looks so far led nowhere.
+  MonotonicTime back_until_{};       ///< It steps back to look: nothing else is planned.
+  MonotonicTime thin_until_{};       ///< Something thin was seen less than kThinLasts before.
+  bool is_narrow_{false};            ///< What is flown was planned so.
+  int failures_{0};                  ///< Decisions in a row without a trajectory.
 };
 
 }  // namespace roborun::flight

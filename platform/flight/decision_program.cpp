@@ -17,8 +17,6 @@ namespace {
 constexpr int kReportDelay = 4;            // minor frames at most, from a commit to its report
 constexpr Nanos kIdlePeriod{100'000'000};  // of reports while there is nothing to decide
 constexpr double kHover_mps = 0.3;
-constexpr double kReached_m = 1.0;
-constexpr double kReached_mps = 0.5;
 constexpr Nanos kLatestStop{20'000'000};  // 12 cm at 6 m/s
 
 }  // namespace
@@ -237,7 +235,7 @@ const Vector3& DecisionProgram::choose_goal(MonotonicTime now, const FlightRepor
   const Vector3 p_WB = state.p_WB + state.shift_W;  // where goals are given
   bool other = goals_.take(now, p_WB);
   if (!other && report.airborne && report.action == Action::kGoOn) {
-    const bool reached = (goals_.now_W() - p_WB).norm() < kReached_m && state.v_WB.norm() < kReached_mps;
+    const bool reached = is_at_goal((goals_.now_W() - p_WB).norm(), state.v_WB.norm());
     if (reached || is_goal_blocked() || has_no_way())
       other = goals_.next(reached             ? GoalAnswer::kReached
                           : is_goal_blocked() ? GoalAnswer::kBlocked
@@ -286,7 +284,10 @@ void DecisionProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
   pipeline_.run(stage, in_, out_);
   if (slot == SlotId::kMap && out_.early_stop && hand_over(*out_.early_stop, true, lane))
     in_.committed = &handed_over_;
-  if (slot == SlotId::kSmoother) judge();
+  if (slot == SlotId::kSmoother) {
+    report_.look_W = out_.look_W;
+    judge();
+  }
   if (slot == SlotId::kGovernor || slot == SlotId::kSmoother)
     publish(lane.release() + out_.decision.point.deadline);
   // The planner may find that less is left to do than was expected.

@@ -31,6 +31,7 @@ FailsafePilot::FailsafePilot(const Config& config, FlightControl& control, Aircr
 FailsafeMeasures FailsafePilot::measure(MonotonicTime now, const DecisionReport& d) noexcept {
   FailsafeMeasures m;
   const AircraftHealth health = aircraft_.health(now);
+  battery_ratio_ = health.battery_ratio;
   m.battery_used_ratio = 1.0 - health.battery_ratio;
   m.position_age_s = seconds(now - control_.last_position());
   m.esc_silence_s = seconds(health.esc_silence);
@@ -49,7 +50,7 @@ FailsafeMeasures FailsafePilot::measure(MonotonicTime now, const DecisionReport&
   if (control_.estimator().state(state) != Status::kOk) return m;
   const bool tilted = state.q_WB.toRotationMatrix()(2, 2) < lost_tilt_cos_;
   m.control_lost = tilted || control_.imu_lost(now) ? 1.0 : 0.0;
-  if (control_.flying())
+  if (control_.flying() && !control_.unheard(now))
     m.tracking_error_ratio =
         (state.p_WB - control_.reference().p_W).norm() / planned_radius_m(config_.vehicle);
   // Heights only between climb and descent: both go through the floor.
@@ -67,7 +68,9 @@ void FailsafePilot::guard(MonotonicTime now, const DecisionReport& decision) noe
   FailsafeMeasures measures = measure(now, decision);
   if (control_.descending()) measures.tracking_error_ratio = 0.0;  // the ground stops it, and is meant to
   conditions_ = monitor_.step(now, measures);
-  const Action wanted = governor::arbitrate(conditions_, phase_);
+  Action wanted = governor::arbitrate(conditions_, phase_);
+  if (asked_down_.load(std::memory_order_relaxed))
+    wanted = std::max(wanted, phase_ == Phase::kGround ? Action::kHold : Action::kLand);
   if (!config_.answers) return;
   if (wanted != action_) begin(wanted, now);
   phase_ = governor::phase_after(action_, phase_);

@@ -1,6 +1,7 @@
 /// The failsafe of a flight: conditions to one action, once a minor frame, and the action flown.
 #pragma once
 
+#include <atomic>
 #include <span>
 
 #include "core/geometry/fence.hpp"
@@ -37,8 +38,13 @@ class FailsafePilot {
   /// Judges one minor frame: `decision` is the newest report of the decision lane.
   void guard(MonotonicTime now, const DecisionReport& decision) noexcept;
 
+  /// Down, at the nearest place that is known to be free, as if a condition asked for it; on the ground: stay. For good; any thread.
+  void ask_to_land() noexcept { asked_down_.store(true, std::memory_order_relaxed); }
+
   [[nodiscard]] governor::Phase phase() const noexcept { return phase_; }
   [[nodiscard]] governor::Action action() const noexcept { return action_; }
+  /// Of the newest frame: AircraftHealth::battery_ratio.
+  [[nodiscard]] double battery_ratio() const noexcept { return battery_ratio_; }
   [[nodiscard]] MonotonicTime action_since() const noexcept { return action_since_; }
   /// One for each change of the action; in the air at most five, because none is taken back.
   [[nodiscard]] std::span<const FailsafeEvent> events() const noexcept {
@@ -61,12 +67,14 @@ class FailsafePilot {
   governor::Phase phase_{governor::Phase::kGround};
   governor::Action action_{governor::Action::kGoOn};
   governor::ConditionSet conditions_{0};
+  double battery_ratio_{0.0};
   std::uint8_t depth_sensor_{0};
   stages::FrameFault depth_fault_{};
   core::StaticVector<FailsafeEvent, 2 * governor::kActionCount> events_;
   MonotonicTime operator_heard_{};
   MonotonicTime action_since_{};
   bool site_was_known_{false};
+  std::atomic<bool> asked_down_{false};
 };
 
 }  // namespace roborun::flight

@@ -49,6 +49,9 @@ struct FlightConfig {
   governor::KnobArray<governor::LatencyModel> model{};  ///< Map, export, planner.
   std::uint64_t seed{1};                                ///< Of the planner's random numbers.
   Nanos minor_frame{core::kMinorFrame};                 ///< core::minor_frame_of() a legal rate.
+  /// Without commands it stops straight on, wherever its path leads: an autopilot does. Curves are flown so slowly that this is
+  /// free, too.
+  bool stops_straight{false};
   bool answers{true};  ///< False: the failsafe sees and records, and does nothing. For tests alone.
   [[nodiscard]] Status validate() const noexcept;
 };

@@ -1,6 +1,7 @@
 #include "platform/flight/flight_control.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/geometry/math.hpp"
 #include "core/geometry/yaw.hpp"
@@ -28,6 +29,24 @@ Trajectory take_off(const Vector3& ground_W, double cruise_m, double speed_mps, 
   t.start_time = start;
   (void)stages::append_rest_to_rest(ground_W, Vector3(ground_W.x(), ground_W.y(), cruise_m),
                                     {speed_mps, speed_mps}, t);
+  return t;
+}
+
+/// Straight on to rest, its speed along a smooth step: at most 1.5 v / T of acceleration and 6 v / T^2 of jerk.
+Trajectory stop_from(const Vector3& p_W, const Vector3& v_W, const VehicleModel& vehicle,
+                     MonotonicTime start) {
+  const double v_mps = v_W.norm();
+  if (v_mps < kStand_mps) return Trajectory::hold(p_W, start);
+  const double T_s =
+      std::max(1.5 * v_mps / vehicle.acceleration_mps2, std::sqrt(6.0 * v_mps / vehicle.jerk_mps3));
+  Trajectory t;
+  t.start_time = start;
+  t.segment_count = 1;
+  t.segment[0].duration_s = T_s;
+  t.segment[0].coefficient[0] = p_W;
+  t.segment[0].coefficient[1] = v_W;
+  t.segment[0].coefficient[3] = -v_W / (T_s * T_s);
+  t.segment[0].coefficient[4] = v_W / (2.0 * T_s * T_s * T_s);
   return t;
 }
 
@@ -74,6 +93,53 @@ void FlightControl::sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmwa
   if (estimator_.state(state) == Status::kOk) shift_W_ = state.shift_W;
 }
 
+void FlightControl::sense(MonotonicTime now, firmware_if::Autopilot& autopilot) {
+  constexpr int kMost = 16;
+  const MonotonicTime heard = last_position_;
+  for (int i = 0; i < kMost && autopilot.read(seen_) == Status::kOk; ++i) last_position_ = seen_.stamp;
+  const bool was_silent = last_position_ - heard > kAutopilotSilent;
+  if (seen_.sequence > 0) (void)estimator_.follow(seen_, now, flying_);
+  const firmware_if::AutopilotReport before = autopilot_.value_or(firmware_if::AutopilotReport{});
+  autopilot_ = autopilot.report();
+  stages::EstimatedState state;
+  if (estimator_.state(state) != Status::kOk) return;
+  using firmware_if::AutopilotStage;
+  shift_W_ = state.shift_W;
+  const bool has_turned = state.map_number != map_number_;
+  map_number_ = state.map_number;
+  // While nobody led it, it stopped by itself, somewhere: from there on it is led anew. In a frame that turned, too.
+  const bool was_lost = before.stage == AutopilotStage::kLost && autopilot_->stage == AutopilotStage::kOurs;
+  if ((was_lost || was_silent || has_turned) && flying_) {
+    offered_.reset();
+    committed_ = stop_from(state.p_WB, state.v_WB, vehicle_, now);
+    ++committed_number_;
+    braking_ = descending_ = false;
+  }
+  if (asked_ && !may_take_off_ && !flying_) withdraw(autopilot);
+  if (asked_ || !may_take_off_ || autopilot_->stage != AutopilotStage::kReady) return;
+  asked_ = true;
+  stood_m_ = state.p_WB.z();
+  autopilot.take_command(cruise_m_ - state.p_WB.z());
+}
+
+void FlightControl::withdraw(firmware_if::Autopilot& autopilot) {
+  using firmware_if::AutopilotStage;
+  const bool taken =
+      autopilot_->stage == AutopilotStage::kTaking || autopilot_->stage == AutopilotStage::kOurs;
+  if (!taken || withdrawn_) return;
+  if (!autopilot_->in_air) {
+    withdrawn_ = true;
+    autopilot.disarm();
+  } else {
+    autopilot.take_command(0.0);
+  }
+}
+
+bool FlightControl::may_climb(MonotonicTime now) const {
+  const bool obeys = !autopilot_ || autopilot_->stage == firmware_if::AutopilotStage::kOurs;
+  return now - *first_estimate_ >= kSettle && may_take_off_ && obeys;
+}
+
 void FlightControl::commit(MonotonicTime now) {
   stages::EstimatedState state;
   if (estimator_.state(state) != Status::kOk) return;
@@ -84,12 +150,16 @@ void FlightControl::commit(MonotonicTime now) {
     gaze_.begin(yaw_rad_);
   }
   if (!flying_) {
-    if (now - *first_estimate_ < kSettle || !may_take_off_) return;
-    committed_ = take_off(state.p_WB, cruise_m_, std::min(kTakeOff_mps, vehicle_.climb_mps), now);
+    // Withdrawn in the autopilot's own climb: it flies, so it is led, and the failsafe says where to.
+    const bool withdrawn = asked_ && !may_take_off_ && autopilot_->in_air &&
+                           autopilot_->stage == firmware_if::AutopilotStage::kOurs;
+    if (!withdrawn && !may_climb(now)) return;
+    committed_ = withdrawn ? stop_from(state.p_WB, state.v_WB, vehicle_, now)
+                           : take_off(state.p_WB, cruise_m_, std::min(kTakeOff_mps, vehicle_.climb_mps), now);
     ++committed_number_;
     flying_ = true;
     home_W_ = committed_.end_W() + state.shift_W;
-    ground_m_ = state.p_WB.z();
+    ground_m_ = stood_m_.value_or(state.p_WB.z());
   }
   if (!airborne_ && now > committed_.start_time + from_seconds(committed_.duration_s()) + kHover &&
       gaze_.ready())
@@ -184,12 +254,31 @@ void FlightControl::watch_touchdown(MonotonicTime now, const stages::EstimatedSt
   landed_ = now - moving_ >= kLanded;
 }
 
+void FlightControl::track(MonotonicTime now, firmware_if::Autopilot& autopilot) {
+  stages::EstimatedState state;
+  if (landed_ || estimator_.state(state) != Status::kOk) return;
+  if (flying_) {
+    reference_ = next_reference(now);
+    if (!descending_) yaw_rad_ = gaze_.step({now, committed_, committed_number_, look_W_});
+  } else {
+    reference_ = {};
+    reference_.p_W = state.p_WB;
+  }
+  const auto array = [](const Vector3& v) { return std::array<double, 3>{v.x(), v.y(), v.z()}; };
+  (void)autopilot.command(
+      now, {array(reference_.p_W + shift_W_), array(reference_.v_W), array(reference_.a_W), yaw_rad_});
+  if (!descending_) return;
+  // The autopilot's landing detector has its own witnesses; ours is that it stands still.
+  if (autopilot.report().in_air || std::fabs(state.v_WB.z()) > kStand_mps) moving_ = now;
+  landed_ = now - moving_ >= kLanded;
+}
+
 void FlightControl::track(MonotonicTime now, firmware_if::Motors& motors) {
   stages::Tracker::Input in;
   if (!flying_ || landed_ || estimator_.state(in.state) != Status::kOk) return;
   reference_ = next_reference(now);
   in.reference = reference_;
-  if (!descending_) yaw_rad_ = gaze_.step({now, committed_, committed_number_});
+  if (!descending_) yaw_rad_ = gaze_.step({now, committed_, committed_number_, look_W_});
   in.yaw_rad = yaw_rad_;
   // A refused step leaves the command of the frame before.
   (void)tracker_.step(in, command_);

@@ -6,6 +6,7 @@
 
 #include "core/trajectory.hpp"
 #include "core/vehicle_model.hpp"
+#include "firmware_if/autopilot.hpp"
 #include "firmware_if/barometer.hpp"
 #include "firmware_if/gnss.hpp"
 #include "firmware_if/imu.hpp"
@@ -16,6 +17,9 @@
 #include "stages/control/tracker.hpp"
 
 namespace roborun::flight {
+
+/// The set-point time-out of PX4 and ArduCopter as they are asked to be.
+inline constexpr Nanos kAutopilotSilent{500'000'000};
 
 class FlightControl {
  public:
@@ -33,14 +37,20 @@ class FlightControl {
   void allow_take_off(bool allowed) { may_take_off_ = allowed; }
   /// A trajectory that takes over at its start time. The last one offered counts.
   void offer(const Trajectory& trajectory) { offered_ = trajectory; }
+  /// For a vehicle that does not see all around: what it is to look at; none: where it flies.
+  void look_at(const std::optional<Vector3>& look_W) { look_W_ = look_W; }
   /// The three steps of a minor frame, in this order. RT-safe: O(1), no allocation.
   /// Reads all sensors, at most a ring's worth each, and estimates.
   void sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_if::Barometer& barometer,
              firmware_if::Odometry* odometry = nullptr);
+  /// The same of a vehicle that an autopilot flies: its state is the state. Asks for the command when a take-off is allowed.
+  void sense(MonotonicTime now, firmware_if::Autopilot& autopilot);
   /// Switches to an offered trajectory that is due.
   void commit(MonotonicTime now);
   /// Tracks the committed trajectory and commands the motors; nothing before the take-off.
   void track(MonotonicTime now, firmware_if::Motors& motors);
+  /// Sends the autopilot along it; before the take-off where it stands.
+  void track(MonotonicTime now, firmware_if::Autopilot& autopilot);
   /// All three at once, where nobody asks what each of them takes.
   template <typename Sensors>
   void step(MonotonicTime now, Sensors& sensors, firmware_if::Motors& motors) {
@@ -74,16 +84,27 @@ class FlightControl {
   [[nodiscard]] Vector3 home_W() const { return home_W_ - shift_W_; }
   [[nodiscard]] double ground_m() const { return ground_m_; }
   [[nodiscard]] const TrajectoryPoint& reference() const { return reference_; }
+  /// What the motors were told last; zeros before the take-off, and where an autopilot flies.
+  [[nodiscard]] const firmware_if::MotorCommand& command() const { return command_; }
   /// Validity of the newest fix or sample of the odometry that the estimator took and that differs from the one before.
   [[nodiscard]] MonotonicTime last_position() const { return last_position_; }
+  /// An autopilot has said nothing for so long that it stops by itself: nobody knows how far from the reference it is.
+  [[nodiscard]] bool unheard(MonotonicTime now) const {
+    return autopilot_ && now - last_position_ > kAutopilotSilent;
+  }
   /// No IMU sample for 25 ms, or the same numbers 20 times: a living one is never without noise.
   [[nodiscard]] bool imu_lost(MonotonicTime now) const {
-    return imu_repeats_ >= kMostRepeats || estimator_.imu_lost(now);
+    // An autopilot's sensors are its own affair; how old its state is shows in last_position().
+    return !autopilot_ && (imu_repeats_ >= kMostRepeats || estimator_.imu_lost(now));
   }
 
  private:
   static constexpr int kMostRepeats = 20;
+  /// Whether the climb to the first hover may begin; with an autopilot, once it obeys.
+  [[nodiscard]] bool may_climb(MonotonicTime now) const;
   [[nodiscard]] TrajectoryPoint next_reference(MonotonicTime now);
+  /// A take-off by the autopilot that is no longer wanted: on the ground disarmed, in the air taken over for a stop.
+  void withdraw(firmware_if::Autopilot& autopilot);
   void watch_touchdown(MonotonicTime now, const stages::EstimatedState& state);
 
   VehicleModel vehicle_;
@@ -100,7 +121,13 @@ class FlightControl {
   bool airborne_{false};
   Gaze gaze_;
   double yaw_rad_{0.0};
+  std::optional<Vector3> look_W_;
   bool may_take_off_{true};
+
+  std::optional<firmware_if::AutopilotReport> autopilot_;  ///< None: there is no autopilot.
+  firmware_if::AutopilotState seen_{};                     ///< Its newest state.
+  bool asked_{false}, withdrawn_{false};                   ///< The command of it.
+  std::optional<double> stood_m_;                          ///< Height where it was when it was asked.
 
   Vector3 home_W_ = Vector3::Zero();
   double ground_m_{0.0};
@@ -111,6 +138,7 @@ class FlightControl {
   firmware_if::OdometrySample odometry_{};
   MonotonicTime last_position_{};
   Vector3 shift_W_ = Vector3::Zero();  ///< EstimatedState::shift_W.
+  std::uint32_t map_number_{0};        ///< EstimatedState::map_number, of an autopilot's state.
 
   bool braking_{false};
   double brake_at_s_{0.0};  ///< Where on the committed trajectory.

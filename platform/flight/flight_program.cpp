@@ -20,16 +20,25 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
       aircraft_.begin_frame(now);
       return;
     case SlotId::kSense:
+      if (firmware_if::Autopilot* const autopilot = aircraft_.autopilot()) {
+        autopilot->step(now);  // the sign of life comes from here: no loop, no heartbeat
+        control_.sense(now, *autopilot);
+        return;
+      }
       control_.sense(aircraft_.imu(), aircraft_.gnss(), aircraft_.barometer(), aircraft_.odometry());
       return;
     case SlotId::kCommit:
       (void)mail_.decision.take();
       pilot_.guard(now, mail_.decision.read());
+      control_.look_at(mail_.decision.read().look_W);
       take_offers(now, lane);
       control_.commit(now);
       return;
     case SlotId::kTrack:
-      control_.track(now, aircraft_.motors());
+      if (firmware_if::Autopilot* const autopilot = aircraft_.autopilot())
+        control_.track(now, *autopilot);
+      else
+        control_.track(now, aircraft_.motors());
       aircraft_.end_frame(now);
       return;
     case SlotId::kPublish:

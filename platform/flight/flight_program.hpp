@@ -20,6 +20,8 @@ class FlightProgram final : public core::LaneProgram {
   /// than the committed trajectory will be; never decreases.
   [[nodiscard]] std::uint64_t offers_refused() const noexcept { return offers_refused_; }
   [[nodiscard]] const FailsafePilot& pilot() const noexcept { return pilot_; }
+  /// FailsafePilot::ask_to_land(). Any thread.
+  void ask_to_land() noexcept { pilot_.ask_to_land(); }
 
  private:
   void take_offers(MonotonicTime now, const core::LaneExecutive& lane) noexcept;

@@ -25,11 +25,13 @@ PipelineConfig pipeline_config(const FlightConfig& config) noexcept {
   pipeline.map_bounds_W = map_bounds_W(config);
   pipeline.level_view_ratio = config.level_view_ratio;
   pipeline.sees_all_around = config.sees_all_around;
+  pipeline.turns = config.gaze.follows;
   pipeline.too_near_m = config.too_near_m;
   pipeline.horizon_m = config.camera_range_m - 1.0;
   pipeline.fence = config.fence;
   pipeline.lattice = lattice_of(config);
   pipeline.minor_frame = config.minor_frame;
+  pipeline.stops_straight = config.stops_straight;
   return pipeline;
 }
 
@@ -96,10 +98,6 @@ governor::GovernorConfig governor_config(const FlightConfig& config) noexcept {
   if (config.pixels_per_tan > 0.0)
     g.thin_step_m = config.vehicle.thinnest_m * config.pixels_per_tan / kThinLooks;
   g.coarsest_level = lattice_of(config).coarsest_level_within(config.bounds_W.size().z() / 3.0);
-  // A look at a whole block of the map writes no surfaces inside it, and what is in front of them stays unknown.
-  if (g.lattice.finest_m < kPublishedCell_m)
-    g.coarsest_level = std::min(g.coarsest_level,
-                                g.lattice.coarsest_level_within(0.5 * stages::block_m(g.lattice.finest_m)));
   g.minor_frame = config.minor_frame;
   return g;
 }

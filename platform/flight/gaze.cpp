@@ -8,6 +8,7 @@ namespace roborun::flight {
 namespace {
 
 constexpr double kMoves_mps = 0.3;  // slower than that a direction means little
+constexpr double kBeside_m = 0.3;   // the same of a place
 
 }  // namespace
 
@@ -34,9 +35,13 @@ double Gaze::step(const Input& in) noexcept {
   const bool moves = core::hypot2(v_W.x(), v_W.y()) > kMoves_mps;
   if (moves || in.committed_number != number_ || in.now < ends) still_since_ = in.now;
   number_ = in.committed_number;
-  if (moves) {
+  const bool stuck = in.now - still_since_ >= from_seconds(config_.stuck_s);
+  const Vector3 look_W = in.look_W ? Vector3(*in.look_W - in.committed.at(in.now).p_W) : Vector3::Zero();
+  if (!stuck && core::hypot2(look_W.x(), look_W.y()) > kBeside_m) {
+    turn_to(core::atan2(look_W.y(), look_W.x()));
+  } else if (moves) {
     turn_to(core::atan2(v_W.y(), v_W.x()));
-  } else if (in.now - still_since_ >= from_seconds(config_.stuck_s)) {
+  } else if (stuck) {
     turn_on();
   }
   return yaw_rad_;

@@ -1,8 +1,9 @@
 /// Where a vehicle looks that does not see all around: a look round before its first move, then where its trajectory
-/// goes, and round again when it is stuck. Safety does not depend on it: what is flown stays in known free space.
+/// goes, or at what it has to see; and round again when it is stuck. Safety does not depend on it: what is flown stays in known free space.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "core/trajectory.hpp"
 #include "firmware_if/time.hpp"
@@ -16,6 +17,7 @@ class Gaze {
     MonotonicTime now{};
     const Trajectory& committed;
     std::uint64_t committed_number{};  ///< Another one for each trajectory.
+    std::optional<Vector3> look_W{};   ///< What it is to see, until it is stuck.
   };
   Gaze(const GazeConfig& config, double period_s) noexcept : config_(config), period_s_(period_s) {}
 

@@ -14,9 +14,14 @@
 
 namespace roborun::flight {
 
+/// Where a flight has reached its goal.
+[[nodiscard]] constexpr bool is_at_goal(double to_goal_m, double speed_mps) noexcept {
+  return to_goal_m < 1.0 && speed_mps < 0.5;
+}
+
 enum class GoalAnswer : std::uint8_t {
   kFlown,     ///< No answer yet: it is flown to, or it is to come.
-  kReached,   ///< Within 1 m of it and slower than 0.5 m/s, by the vehicle's own estimate.
+  kReached,   ///< is_at_goal(), by the vehicle's own estimate.
   kBlocked,   ///< No room for the vehicle at it: it hovers at the nearest place that it could reach.
   kNoWay,     ///< Proof that no way leads to it.
   kReplaced,  ///< Others were given in its place.

@@ -1,6 +1,8 @@
 /// What the flight lane and the decision lane tell each other.
 #pragma once
 
+#include <optional>
+
 #include "core/exchange/mailbox.hpp"
 #include "core/geometry/vector.hpp"
 #include "core/trajectory.hpp"
@@ -46,6 +48,8 @@ struct DecisionReport {
   int map_refusals{};  ///< Decisions in a row in which the map refused bricks.
   bool site_known{false};
   Vector3 site_W = Vector3::Zero();  ///< Below it everything is known to be free.
+  /// What decides about the way is to be seen there, and no way was found without it.
+  std::optional<Vector3> look_W{};
 };
 
 struct LaneMail {

@@ -23,24 +23,32 @@ void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> poi
   struct Place {
     Vector3 p_W;
     int points;
+    Vector3 sum_W;
+    int ahead;
   };
   core::StaticVector<Place, kTraces / 4> appeared;
   for (const stages::CloudPoint& point : points) {
     const Vector3 offset = point.p_W - in.p_WB;
     const bool behind = offset.dot(in.v_WB) < 0.0 && in.v_WB.norm() > kStanding_mps;
-    if (offset.norm() > kReach_m || behind || !in.relevant_W.contains(point.p_W)) continue;
+    if (offset.norm() > kReach_m || !in.relevant_W.contains(point.p_W)) continue;
     if (!known.is_free_at_finest(Aabb::around(point.p_W, kAppeared_m), work.units)) continue;
     const auto place = std::find_if(appeared.begin(), appeared.end(), [&point](const Place& other) {
       return (other.p_W - point.p_W).squaredNorm() < kSpacing_m * kSpacing_m;
     });
-    if (place != appeared.end())
+    if (place != appeared.end()) {
       ++place->points;
-    else if (!appeared.push_back({point.p_W, 1}))
+      place->sum_W += point.p_W;
+      place->ahead += behind ? 0 : 1;
+    } else if (!appeared.push_back({point.p_W, 1, point.p_W, behind ? 0 : 1})) {
       break;
+    }
   }
   // A body is in one place; pixels between two depths lie here and there.
+  appeared_W_.clear();
   for (const Place& place : appeared) {
     if (place.points < kLeastPoints) continue;
+    (void)appeared_W_.push_back(place.sum_W / place.points);
+    if (place.ahead < kLeastPoints) continue;
     moving_until_ = in.now + kMemory;
     trace_[next_trace_] = {place.p_W, in.now + kTraceMemory};
     next_trace_ = (next_trace_ + 1) % kTraces;

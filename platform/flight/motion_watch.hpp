@@ -28,10 +28,14 @@ class MotionWatch {
     Aabb relevant_W{};  ///< What moves outside of it does not matter.
   };
 
-  /// Compares the cloud of this decision with `known`, the map before it gets the same images. Not behind the
-  /// vehicle: who is followed must not slow down. `work.units` counts map lookups.
+  /// Compares the cloud of this decision with `known`, the map before it gets the same images. What
+  /// is behind the vehicle is no motion: who is followed must not slow down. `work.units` counts map lookups.
   void sense(const Input& in, std::span<const stages::CloudPoint> points, const stages::MapView& known,
              core::StageBudget& budget, core::Work& work) noexcept;
+  /// Centres of what appeared in space known to be free, in the last decision that was sensed.
+  [[nodiscard]] std::span<const Vector3> appeared_W() const noexcept {
+    return {appeared_W_.begin(), appeared_W_.size()};
+  }
   /// Something was seen to move within the last seconds.
   [[nodiscard]] bool moving(MonotonicTime now) const noexcept { return now < moving_until_; }
   /// Where something was seen to move, for as long as the map may remember what has gone.
@@ -45,6 +49,7 @@ class MotionWatch {
   MonotonicTime moving_until_{};
   std::array<Trace, kTraces> trace_{};  ///< A ring.
   std::size_t next_trace_{0};
+  core::StaticVector<Vector3, kTraces / 4> appeared_W_;
 };
 
 }  // namespace roborun::flight

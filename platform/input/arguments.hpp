@@ -24,5 +24,7 @@ namespace roborun::input {
 [[nodiscard]] int jobs_of(const std::string& text);
 /// Throws.
 [[nodiscard]] std::uint64_t seed_of(std::string_view option, const std::string& text);
+/// A word of a command line, as a shell reads it back.
+[[nodiscard]] std::string shell_word(const std::string& word);
 
 }  // namespace roborun::input

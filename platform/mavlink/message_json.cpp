@@ -19,7 +19,7 @@ namespace roborun::mavlink {
 namespace {
 
 namespace mav = firmware_if::mavlink;
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 using mav::FieldType;
 
 constexpr std::uint32_t kUsualNan = 0x7fc00000;
@@ -40,21 +40,21 @@ double with_few_digits(float value) {
   return static_cast<float>(near) == value ? near : static_cast<double>(value);
 }
 
-Json float_value(std::uint32_t bits) {
+OrderedJson float_value(std::uint32_t bits) {
   const auto value = std::bit_cast<float>(bits);
   if (std::isinf(value)) return value > 0 ? "Infinity" : "-Infinity";
   if (!std::isnan(value)) return with_few_digits(value);
   return bits == kUsualNan ? "NaN" : fmt::format("NaN(0x{:08x})", bits);
 }
 
-Json item_value(std::uint64_t bits, FieldType type) {
+OrderedJson item_value(std::uint64_t bits, FieldType type) {
   if (type == FieldType::kFloat) return float_value(static_cast<std::uint32_t>(bits));
   if (!is_signed(type)) return bits;
   const auto unused = static_cast<unsigned>(64 - 8 * mav::size_bytes(type));
   return static_cast<std::int64_t>(bits << unused) >> unused;
 }
 
-Json field_value(const mav::Field& field, std::span<const std::uint8_t> payload) {
+OrderedJson field_value(const mav::Field& field, std::span<const std::uint8_t> payload) {
   if (field.type == FieldType::kChar) {
     std::vector<std::uint8_t> bytes(field.count());
     for (std::size_t i = 0; i < bytes.size(); ++i)
@@ -63,16 +63,16 @@ Json field_value(const mav::Field& field, std::span<const std::uint8_t> payload)
     return input::text_of_bytes(bytes);
   }
   if (field.array_count == 0) return item_value(mav::read_bits(payload, field), field.type);
-  Json items = Json::array();
+  OrderedJson items = OrderedJson::array();
   for (std::size_t i = 0; i < field.count(); ++i)
     items.push_back(item_value(mav::read_bits(payload, field, i), field.type));
   return items;
 }
 
-Json signature_of(std::span<const std::uint8_t, mav::kSignatureBlock_bytes> block) {
+OrderedJson signature_of(std::span<const std::uint8_t, mav::kSignatureBlock_bytes> block) {
   mav::SigningTime timestamp = 0;
   for (std::size_t i = 0; i < 6; ++i) timestamp |= static_cast<mav::SigningTime>(block[1 + i]) << (8U * i);
-  Json out;
+  OrderedJson out;
   out["link_id"] = block[0];
   out["timestamp"] = timestamp;
   out["hash"] = fmt::format("{:02x}", fmt::join(block.last<kHash_bytes>(), ""));
@@ -81,13 +81,13 @@ Json signature_of(std::span<const std::uint8_t, mav::kSignatureBlock_bytes> bloc
 
 // ---- in
 
-[[noreturn]] void refuse(std::string_view name, const Json& value, std::string_view wanted) {
-  std::string given = value.dump(-1, ' ', false, Json::error_handler_t::replace);
+[[noreturn]] void refuse(std::string_view name, const OrderedJson& value, std::string_view wanted) {
+  std::string given = value.dump(-1, ' ', false, OrderedJson::error_handler_t::replace);
   if (given.size() > 60) given = given.substr(0, 60) + " ...";
   throw InputError(fmt::format("{}: {} is not {}", name, given, wanted));
 }
 
-std::uint64_t whole(const Json& value, std::string_view name, std::int64_t low, std::uint64_t high) {
+std::uint64_t whole(const OrderedJson& value, std::string_view name, std::int64_t low, std::uint64_t high) {
   const bool fits = value.is_number_unsigned()
                         ? value.get<std::uint64_t>() <= high
                         : value.is_number_integer() && value.get<std::int64_t>() >= low;
@@ -96,11 +96,12 @@ std::uint64_t whole(const Json& value, std::string_view name, std::int64_t low, 
                                     : static_cast<std::uint64_t>(value.get<std::int64_t>());
 }
 
-std::uint64_t whole_or(const Json& object, const char* name, std::uint64_t high, std::uint64_t otherwise) {
+std::uint64_t whole_or(const OrderedJson& object, const char* name, std::uint64_t high,
+                       std::uint64_t otherwise) {
   return object.contains(name) ? whole(object[name], name, 0, high) : otherwise;
 }
 
-std::uint32_t float_bits(const Json& value, const std::string& name) {
+std::uint32_t float_bits(const OrderedJson& value, const std::string& name) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   if (value == "NaN") return kUsualNan;
   if (value == "Infinity") return std::bit_cast<std::uint32_t>(kInfinity);
@@ -120,7 +121,7 @@ std::uint32_t float_bits(const Json& value, const std::string& name) {
   return std::bit_cast<std::uint32_t>(number);
 }
 
-std::uint64_t item_bits(const Json& value, FieldType type, const std::string& name) {
+std::uint64_t item_bits(const OrderedJson& value, FieldType type, const std::string& name) {
   if (type == FieldType::kFloat) return float_bits(value, name);
   const auto size_bits = static_cast<unsigned>(8 * mav::size_bytes(type));
   const std::uint64_t all = std::numeric_limits<std::uint64_t>::max() >> (64U - size_bits);
@@ -128,7 +129,7 @@ std::uint64_t item_bits(const Json& value, FieldType type, const std::string& na
   return whole(value, name, -static_cast<std::int64_t>(all / 2) - 1, all / 2);
 }
 
-void write_field(mav::Payload& payload, const mav::Field& field, const Json& value) {
+void write_field(mav::Payload& payload, const mav::Field& field, const OrderedJson& value) {
   const auto name = fmt::format("field '{}'", field.name);
   if (field.type == FieldType::kChar) {
     if (!value.is_string()) refuse(name, value, "a text");
@@ -146,7 +147,7 @@ void write_field(mav::Payload& payload, const mav::Field& field, const Json& val
   }
 }
 
-mav::Payload payload_of(const mav::MessageType& type, const Json& fields, bool v1) {
+mav::Payload payload_of(const mav::MessageType& type, const OrderedJson& fields, bool v1) {
   if (!fields.is_object()) refuse("fields", fields, "an object");
   mav::Payload payload{};
   for (const auto& [name, value] : fields.items()) {
@@ -161,7 +162,7 @@ mav::Payload payload_of(const mav::MessageType& type, const Json& fields, bool v
   return payload;
 }
 
-const mav::MessageType& type_of(const Json& object) {
+const mav::MessageType& type_of(const OrderedJson& object) {
   const mav::MessageType* type = nullptr;
   if (object.contains("msgid")) {
     type = mav::find_message(static_cast<std::uint32_t>(whole(object["msgid"], "msgid", 0, 0xffffff)));
@@ -177,7 +178,7 @@ const mav::MessageType& type_of(const Json& object) {
   return *type;
 }
 
-void refuse_unknown_keys(const Json& object) {
+void refuse_unknown_keys(const OrderedJson& object) {
   constexpr std::array<std::string_view, 10> kKnown{"time_us", "msgid",  "name",   "version",   "seq",
                                                     "sysid",   "compid", "signed", "signature", "fields"};
   if (!object.is_object()) throw InputError("must be an object with name or msgid, and fields");
@@ -189,8 +190,8 @@ void refuse_unknown_keys(const Json& object) {
 }
 
 /// The hash as it stands in the object.
-std::array<std::uint8_t, kHash_bytes> hash_of(const Json& signature) {
-  const Json given = signature.contains("hash") ? signature["hash"] : Json();
+std::array<std::uint8_t, kHash_bytes> hash_of(const OrderedJson& signature) {
+  const OrderedJson given = signature.contains("hash") ? signature["hash"] : OrderedJson();
   const auto text = given.is_string() ? given.get<std::string>() : std::string();
   std::array<std::uint8_t, kHash_bytes> hash{};
   bool good = text.size() == 2 * hash.size();
@@ -210,7 +211,7 @@ std::vector<std::uint8_t> frame_of(const mav::MessageType& type, const mav::Fram
 }
 
 std::vector<std::uint8_t> signed_frame(const mav::MessageType& type, const mav::FrameHeader& header,
-                                       const mav::Payload& payload, const Json& signature,
+                                       const mav::Payload& payload, const OrderedJson& signature,
                                        const mav::SigningKey* key) {
   if (!signature.is_object() || !signature.contains("link_id") || !signature.contains("timestamp"))
     refuse("signature", signature, "an object with link_id, timestamp and (without --key) hash");
@@ -227,8 +228,8 @@ std::vector<std::uint8_t> signed_frame(const mav::MessageType& type, const mav::
 
 }  // namespace
 
-Json to_json(const mav::Frame& frame) {
-  Json out;
+OrderedJson to_json(const mav::Frame& frame) {
+  OrderedJson out;
   out["msgid"] = frame.msgid;
   out["name"] = frame.type->name;
   out["version"] = frame.version;
@@ -237,7 +238,7 @@ Json to_json(const mav::Frame& frame) {
   out["compid"] = frame.header.compid;
   out["signed"] = frame.has_signature;
   if (frame.has_signature) out["signature"] = signature_of(frame.bytes.last<mav::kSignatureBlock_bytes>());
-  Json fields = Json::object();
+  OrderedJson fields = OrderedJson::object();
   for (const mav::Field& field : frame.type->fields) {
     if (frame.version == 2 || !field.extension)
       fields[std::string(field.name)] = field_value(field, frame.payload);
@@ -246,7 +247,7 @@ Json to_json(const mav::Frame& frame) {
   return out;
 }
 
-std::vector<std::uint8_t> from_json(const Json& object, std::uint8_t seq, const mav::SigningKey* key) {
+std::vector<std::uint8_t> from_json(const OrderedJson& object, std::uint8_t seq, const mav::SigningKey* key) {
   refuse_unknown_keys(object);
   const mav::MessageType& type = type_of(object);
   const std::uint64_t version = whole_or(object, "version", 2, 2);
@@ -255,8 +256,8 @@ std::vector<std::uint8_t> from_json(const Json& object, std::uint8_t seq, const 
                                 .sysid = static_cast<std::uint8_t>(whole_or(object, "sysid", 255, 1)),
                                 .compid = static_cast<std::uint8_t>(whole_or(object, "compid", 255, 191))};
   const mav::Payload payload =
-      payload_of(type, object.contains("fields") ? object["fields"] : Json::object(), version == 1);
-  const Json is_signed_value = object.contains("signed") ? object["signed"] : Json(false);
+      payload_of(type, object.contains("fields") ? object["fields"] : OrderedJson::object(), version == 1);
+  const OrderedJson is_signed_value = object.contains("signed") ? object["signed"] : OrderedJson(false);
   if (!is_signed_value.is_boolean()) refuse("signed", is_signed_value, "true or false");
 
   if (version == 1) {
@@ -268,8 +269,8 @@ std::vector<std::uint8_t> from_json(const Json& object, std::uint8_t seq, const 
     return bytes;
   }
   if (!is_signed_value.get<bool>()) return frame_of(type, header, payload, nullptr);
-  return signed_frame(type, header, payload, object.contains("signature") ? object["signature"] : Json(),
-                      key);
+  return signed_frame(type, header, payload,
+                      object.contains("signature") ? object["signature"] : OrderedJson(), key);
 }
 
 }  // namespace roborun::mavlink

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -12,12 +14,16 @@
 #include "platform/board/plugin_loader.hpp"
 #include "platform/flight/lockstep_flight.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/log/flight_log.hpp"
+#include "platform/mission/flight_records.hpp"
 #include "platform/mission/flight_setup.hpp"
 #include "platform/mission/mission_faults.hpp"
 #include "platform/mission/mission_judge.hpp"
+#include "platform/mission/recorded_flight.hpp"
 #include "platform/mission/recording.hpp"
 #include "platform/mission/work_check.hpp"
 #include "platform/sitl/aircraft/camera_rig.hpp"
+#include "platform/sitl/autopilot/autopilot_aircraft.hpp"
 
 namespace roborun::mission {
 namespace {
@@ -71,22 +77,6 @@ std::string sensor_name(std::size_t sensor) {
   return fmt::format("{} {}", is_camera ? "camera" : "lidar", sensor - (is_camera ? 0 : kMostCameras) + 1);
 }
 
-/// "camera 1: covered".
-std::string sensor_of(const flight::FailsafeEvent& e) {
-  return fmt::format("{}: {}", sensor_name(e.depth_sensor),
-                     e.depth_fault == stages::FrameFault::kNone ? "silent" : to_string(e.depth_fault));
-}
-
-/// "camera 1 fog+camera 2 turned"; each once, though a LiDAR has six images.
-std::string text_of(std::span<const flight::RefusedImage> refused) {
-  std::string text;
-  for (const flight::RefusedImage& image : refused) {
-    const std::string one = fmt::format("{} {}", sensor_name(image.sensor), to_string(image.fault));
-    if (text.find(one) == std::string::npos) text += (text.empty() ? "" : "+") + one;
-  }
-  return text;
-}
-
 std::vector<report::RefusedRecord> records_of(const flight::RefusedCounts& refused) {
   std::vector<report::RefusedRecord> records;
   for (std::size_t sensor = 0; sensor < refused.size(); ++sensor)
@@ -95,6 +85,41 @@ std::vector<report::RefusedRecord> records_of(const flight::RefusedCounts& refus
         records.push_back(
             {sensor_name(sensor), to_string(static_cast<stages::FrameFault>(fault)), refused[sensor][fault]});
   return records;
+}
+
+/// The same for traces and plots.
+report::DecisionRecord record_of(const log::DecisionEntry& e) {
+  report::DecisionRecord r;
+  r.time_s = seconds(Nanos{e.time_ns});
+  r.p_WB = {e.p_WB[0], e.p_WB[1], e.p_WB[2]};
+  r.speed_mps = e.speed_mps;
+  r.p0_m = e.p0_m;
+  r.p1_m = e.p1_m;
+  r.v0_m3 = e.v0_m3;
+  r.v1_m3 = e.v1_m3;
+  r.v2_m3 = e.v2_m3;
+  r.time_budget_s = e.time_budget_s;
+  r.budget_source = e.budget_source;
+  r.deadline_s = e.deadline_s;
+  r.latency_s = e.latency_s;
+  r.stage_s = e.stage_s;
+  r.predicted_s = e.predicted_s;
+  r.solver = e.solver;
+  r.active = e.active.view();
+  r.demand_m = e.demand_m;
+  r.speed_limit_mps = e.speed_limit_mps;
+  r.visible_m = e.visible_m;
+  r.closest_obstacle_m = e.closest_obstacle_m;
+  r.gap_average_m = e.gap_average_m;
+  r.sensor_volume_m3 = e.sensor_volume_m3;
+  r.map_volume_m3 = e.map_volume_m3;
+  r.ways_status = e.ways;
+  r.way_m = e.way_m;
+  r.planner_status = e.planner;
+  r.smoother_status = e.smoother;
+  r.refused = e.refused.view();
+  r.missed = e.missed;
+  return r;
 }
 
 constexpr const char* kCustom = "custom";  // what the caller brought, in reports
@@ -117,6 +142,7 @@ std::vector<core::CostProfile> prices_of(const MissionConfig& config, const flig
 /// bounds.
 const MissionConfig& checked(const sitl::World& world, const MissionConfig& config) {
   const double room_m = planned_radius_m(config.flight.vehicle);
+  if (config.route) check_route(*config.route, world.bounds_W(), config.flight.fence, room_m);
   for (const auto& [name, p_W] : {std::pair{"start", world.start_W()}, std::pair{"goal", world.goal_W()}}) {
     if (!config.flight.fence.allows(Aabb::around(p_W, room_m)))
       throw InputError(
@@ -153,13 +179,24 @@ class MissionRun {
 
  private:
   [[nodiscard]] flight::FlightParts parts();
+  /// What the runtime flies.
+  [[nodiscard]] flight::Aircraft& flown() {
+    if (recorder_) return recorder_->aircraft();
+    return autopilot_ ? static_cast<flight::Aircraft&>(*autopilot_) : aircraft_;
+  }
   void begin_faults();
   /// Those that are due.
   void give_goals();
   void record_goals();
+  /// Gives the goals of a route, and does what is done at them: as live::LiveRun.
+  void follow_route(std::uint64_t frame);
   /// Throws InputError for a planner of somebody else's that does not say what it does.
   void refuse_silence() const;
   void record_decision(const flight::DecisionOutput& out);
+  /// What is due in this minor frame.
+  void log_frame(MonotonicTime now);
+  void log_decision(const log::DecisionEntry& entry, MonotonicTime now);
+  void end_log(const char* reason);
   void record_failsafe();
   void summarise(double wall_s);
 
@@ -169,8 +206,11 @@ class MissionRun {
   MissionFaults faults_;
   sitl::CameraRig rig_;
   sitl::SimulatedAircraft aircraft_;
+  std::unique_ptr<sitl::AutopilotAircraft> autopilot_;  ///< Null: the runtime commands the motors.
   std::vector<firmware_if::DepthCamera*> cameras_;
-  std::unique_ptr<FlightRecorder> recorder_;  ///< Null: nothing is recorded.
+  std::unique_ptr<log::FlightLog> log_;                                   ///< Null: there is none.
+  std::unique_ptr<FlightRecorder> recorder_;                              ///< Null: no inputs are recorded.
+  std::atomic<double> cap_mps_{std::numeric_limits<double>::infinity()};  ///< As a route says.
   FlightSetup setup_;
   std::vector<core::CostProfile> prices_;  ///< Those flown, and those of this machine if they are known.
   TimedMap timed_map_;
@@ -181,9 +221,13 @@ class MissionRun {
   MissionJudge judge_;
   std::size_t given_{0};  ///< Of config_.goals.
   std::vector<report::GoalRecord> refused_;
+  std::optional<RouteFlight> route_;
+  Vector3 route_goal_W_ = Vector3::Zero();
   core::StateHash hash_;
   report::MissionReport report_;
   std::vector<double> latencies_s_;
+  MonotonicTime next_state_{}, next_slice_{};  ///< Of the log.
+  std::size_t told_events_{0};                 ///< Of the failsafe.
 };
 
 MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
@@ -194,25 +238,67 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
       rig_(world, config.simulator, config.seed),
       aircraft_(flight_config_.vehicle, config.simulator, ground_below(world), config.seed,
                 config.flight.minor_frame, rig_),
+      autopilot_(config.autopilot ? std::make_unique<sitl::AutopilotAircraft>(
+                                        aircraft_, config.flight.vehicle, config.flight.minor_frame,
+                                        companion_config(*config.autopilot, config.flight.vehicle))
+                                  : nullptr),
       cameras_(faults_.connect(rig_.cameras())),
-      recorder_(config.record.empty()
-                    ? nullptr
-                    : std::make_unique<FlightRecorder>(config.record, flight_config_, config, aircraft_,
-                                                       cameras_, rig_.lidars())),
-      setup_(flight_config_, config.backends, image_limits(config), config.own),
+      log_(config.log.empty() ? nullptr : std::make_unique<log::FlightLog>(config.log, false)),
+      recorder_(log_ && why_not_replayed(config).empty()
+                    ? std::make_unique<FlightRecorder>(*log_, aircraft_, cameras_, rig_.lidars())
+                    : nullptr),
+      setup_(flight_config_, config.backends, image_limits(config),
+             parts_of(config.own, config.route, cap_mps_)),
       prices_(prices_of(config, flight_config_)),
       timed_map_(setup_.parts().map, prices_),
       timed_planner_(setup_.parts().planner, prices_),
       planner_(timed_planner_, faults_.line()),
-      flight_(flight_config_, recorder_ ? recorder_->aircraft() : aircraft_,
+      flight_(flight_config_, flown(),
               recorder_ ? recorder_->cameras() : std::span<firmware_if::DepthCamera* const>(cameras_),
               parts(), setup_.arena(), recorder_ ? recorder_->lidars() : rig_.lidars()),
       system_(flight_.system()),
       judge_(config.judge, flight_config_.fence, flight_config_.vehicle.radius_m, world, aircraft_, system_) {
+  if (config.route) route_.emplace(*config.route);
   setup_.check();
   aircraft_.stand_in(world);
   if (!faults_.empty()) aircraft_.connect(faults_.line());
   if (!config.flight.answers) aircraft_.ignore_kill_switch();
+  if (log_)
+    begin_log(*log_, recorded_flight_of(flight_config_, config_, cameras_, rig_.lidars()),
+              why_not_replayed(config_), config_.profile_name, world_.start_W());
+}
+
+void MissionRun::log_frame(MonotonicTime now) {
+  if (!log_) return;
+  const std::span<const flight::FailsafeEvent> events = system_.pilot().events();
+  for (; told_events_ < events.size(); ++told_events_) log_->write(failsafe_entry(events[told_events_], {}));
+  if (now < next_state_) return;
+  next_state_ = now + kStatePeriod;
+  log::StateRecord record = state_record(system_, now, {}, autopilot_ == nullptr);
+  record.has_truth = true;
+  record.true_p_W = log::numbers_of(aircraft_.vehicle().state().p_WB);
+  log_->write(record);
+}
+
+void MissionRun::log_decision(const log::DecisionEntry& entry, MonotonicTime now) {
+  if (!log_) return;
+  log_->write(entry);
+  if (now < next_slice_) return;
+  next_slice_ = now + kSlicePeriod;
+  const auto slice = std::make_unique<log::MapSlice>();
+  slice->time_ns = entry.time_ns;
+  fill_slice(system_.map().view(), aircraft_.vehicle().state().p_WB, *slice);
+  log_->write(*slice);
+}
+
+void MissionRun::end_log(const char* reason) {
+  if (!log_) return;
+  const std::int64_t time_ns = flight_.now().time_since_epoch().count();
+  if (recorder_) recorder_->finish(system_.map());
+  log_->event(time_ns, log::Level::kInfo, "flight", reason);
+  log_->result(time_ns, report::to_json(report_.result));
+  log_->finish();
+  report_.log_error = log_->error();
 }
 
 flight::FlightParts MissionRun::parts() {
@@ -254,7 +340,41 @@ void MissionRun::give_goals() {
   }
 }
 
+void MissionRun::follow_route(std::uint64_t frame) {
+  constexpr std::uint64_t kEvery = 20;  // 50 ms
+  if (!route_ || frame % kEvery != 0) return;
+  const MonotonicTime now = flight_.now();
+  judge_.on_route(route_->is_done(), route_->holds(), now);
+  stages::EstimatedState state;
+  if (system_.pilot().phase() != governor::Phase::kMission ||
+      system_.control().estimator().state(state) != Status::kOk)
+    return;
+  const double now_s = seconds(now.time_since_epoch());
+  const Vector3 p_W = state.p_WB + state.shift_W;
+  const bool is_there = flight::is_at_goal((p_W - route_goal_W_).norm(), state.v_WB.norm());
+  const std::size_t at = route_->done();
+  const RouteFlight::Order order = route_->step(now_s, p_W, is_there);
+  if (order.speed_mps) cap_mps_.store(*order.speed_mps, std::memory_order_relaxed);
+  if (order.releases && autopilot_) autopilot_->companion().release_package();
+  if (order.goal_W) {
+    route_goal_W_ = *order.goal_W;
+    (void)system_.decision_program().give_goals({&*order.goal_W, 1});  // refused: it does not come nearer
+  }
+  if (route_->done() > at && config_.route->steps[at].goal_W)
+    report_.result.goals.push_back({route_goal_W_, "reached", now_s, (route_goal_W_ - p_W).norm()});
+  judge_.on_route(route_->is_done(), route_->holds(), now);
+}
+
 void MissionRun::record_goals() {
+  if (route_) {
+    const std::uint64_t released = autopilot_ ? autopilot_->companion().counters().releases : 0;
+    report_.result.route = {config_.route->steps.size(), route_->done(), released};
+    if (route_->is_done()) return;
+    const Vector3& p_W = aircraft_.vehicle().state().p_WB;
+    report_.result.goals.push_back({route_goal_W_, report_.result.reason,
+                                    seconds(flight_.now().time_since_epoch()), (route_goal_W_ - p_W).norm()});
+    return;
+  }
   if (config_.goals.empty()) return;
   const double end_s = seconds(flight_.now().time_since_epoch());
   const Vector3& end_W = aircraft_.vehicle().state().p_WB;
@@ -274,45 +394,13 @@ void MissionRun::record_goals() {
 void MissionRun::record_decision(const flight::DecisionOutput& out) {
   if (recorder_) recorder_->decided(out);
   const OperatingPoint& point = out.decision.point;
-  report::DecisionRecord r;
-  r.time_s = seconds(flight_.now().time_since_epoch());
-  r.p_WB = aircraft_.vehicle().state().p_WB;
-  r.speed_mps = aircraft_.vehicle().state().v_WB.norm();
-  r.p0_m = lattice_of(flight_config_).cell_size_m(point.p0_level);
-  r.p1_m = lattice_of(flight_config_).cell_size_m(point.p1_level);
-  r.v0_m3 = out.work[core::StageId::kMap].volume_m3;
-  r.v1_m3 = out.work[core::StageId::kExport].volume_m3;
-  r.v2_m3 = out.work[core::StageId::kPlanner].volume_m3;
-  r.time_budget_s = seconds(out.decision.time_budget);
-  r.budget_source = governor::to_string(out.decision.source);
-  r.deadline_s = seconds(point.deadline);
-  r.latency_s = seconds(out.latency);
-  for (std::size_t i = 0; i < core::kStageCount; ++i) r.stage_s[i] = seconds(out.cost[i]);
-  r.predicted_s = out.decision.predicted_s;
-  r.demand_m = out.decision.demand_m;
-  const governor::SolverSolution& solution = out.decision.solution;
-  r.solver = to_string(solution.status);
-  const auto active = [&r](const char* name) {
-    r.active += (r.active.empty() ? "" : "+") + std::string(name);
-  };
-  for (std::size_t i = 0; i < governor::kConstraintCount; ++i) {
-    if (((solution.active >> i) & 1U) != 0) active(governor::to_string(static_cast<governor::Constraint>(i)));
-  }
-  for (const governor::Reason reason : governor::kReasons) {
-    if ((solution.active & reason) != 0) active(governor::to_string(reason));
-  }
-  r.speed_limit_mps = point.speed_limit_mps;
-  r.visible_m = out.profile.closest_unknown_m;
-  r.closest_obstacle_m = out.profile.closest_obstacle_m;
-  r.gap_average_m = out.profile.gap_average_m;
-  r.sensor_volume_m3 = out.profile.sensor_volume_m3;
-  r.map_volume_m3 = out.profile.map_volume_m3;
-  r.ways_status = to_string(out.ways_status);
-  r.way_m = out.way_m;
-  r.planner_status = to_string(out.planner_status);
-  r.smoother_status = to_string(out.smoother_status);
-  r.refused = text_of(system_.decision_program().refused_now());
-  r.missed = out.latency > point.deadline;
+  const sitl::VehicleState& state = aircraft_.vehicle().state();
+  log::DecisionEntry e = decision_entry(system_, out, lattice_of(flight_config_),
+                                        report_.decisions.size() + 1, flight_.now(), {});
+  e.p_WB = log::numbers_of(state.p_WB);
+  e.speed_mps = state.v_WB.norm();
+  log_decision(e, flight_.now());
+  report::DecisionRecord r = record_of(e);
   hash_.add(r.latency_s);
   hash_.add(r.deadline_s);
   hash_.add(static_cast<std::uint64_t>(point.p0_level));
@@ -357,16 +445,13 @@ void MissionRun::record_failsafe() {
   report_.safety.goal_error_m = (report_.safety.end_W - world_.goal_W()).norm();
   report_.safety.landing_site_was_known = system_.pilot().site_was_known();
   for (const flight::FailsafeEvent& e : system_.pilot().events()) {
-    report::FailsafeRecord record{seconds(e.time.time_since_epoch()),
-                                  governor::to_string(e.action),
-                                  governor::to_string(e.phase),
-                                  {},
-                                  {}};
+    const log::FailsafeEntry entry = failsafe_entry(e, {});
+    report::FailsafeRecord record{
+        seconds(e.time.time_since_epoch()), entry.action, entry.phase, {}, std::string(entry.sensor.view())};
     for (const governor::FailsafeRow& row : governor::kFailsafeTable) {
       if ((e.conditions & governor::bit(row.condition)) != 0)
         record.conditions.emplace_back(governor::to_string(row.condition));
     }
-    if ((e.conditions & governor::bit(governor::Condition::kDepth)) != 0) record.sensor = sensor_of(e);
     report_.safety.actions.push_back(std::move(record));
   }
 }
@@ -379,11 +464,12 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
     const Vector3 before_W = aircraft_.vehicle().state().p_WB;
     begin_faults();
     give_goals();
+    follow_route(frame);
     const MonotonicTime now = flight_.now() + config_.flight.minor_frame;
     if (const flight::DecisionOutput* decision = flight_.step(faults_.computer(now))) {
       record_decision(*decision);
-      if (recorder_) recorder_->check();
     }
+    log_frame(now);
     refuse_silence();
     const sitl::VehicleState& s = aircraft_.vehicle().state();
     report_.result.distance_m += (s.p_WB - before_W).norm();
@@ -401,7 +487,6 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
     reason = judge_.judge(now);
     if (recorder_ && judge_.given_up() && !gave_up) recorder_->gave_up();
   }
-  if (recorder_) recorder_->finish(system_.map());
   report_.result.reason = reason;
   report_.result.reached_goal = report_.result.reason == "reached_goal";
   report_.result.collided = judge_.collided();
@@ -412,6 +497,7 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
     report_.known = known_slice(system_.map().view(), world_.bounds_W(), world_.start_W().z());
   record_failsafe();
   summarise(std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_start).count());
+  end_log(reason);
   return std::move(report_);
 }
 

@@ -20,8 +20,8 @@ struct Progress {
 /// (motors off, on the ground); a touch-down of at most 2 m/s is no collision. A contact with a moving body
 /// is a "collision" if the vehicle's own velocity towards its centre is above 0.3 m/s, and otherwise ends the
 /// mission as "struck": the body ran into the vehicle. result.env, mission and
-/// profile are left to the caller. Throws InputError for an unknown backend, and for a recording that
-/// cannot be written, or whose flight has faults that no recording holds (FlightRecorder).
+/// profile are left to the caller. Throws InputError for an unknown backend, and for a log that cannot be begun; one
+/// that cannot be written on does not end the flight (MissionReport::log_error).
 [[nodiscard]] report::MissionReport fly_mission(const sitl::World& world, const MissionConfig& config,
                                                 const std::function<void(const Progress&)>& progress);
 

@@ -20,11 +20,11 @@ governor::Design design_of(const char* option, const std::string& name) {
       name));
 }
 
-flight::FlightConfig flight_config_of(const sitl::World& world, const MissionConfig& config) {
+flight::FlightConfig flight_config_in(const FlightSpace& space, const MissionConfig& config) {
   flight::FlightConfig flight = config.flight;
-  flight.bounds_W = world.bounds_W();
-  flight.goal_W = world.goal_W();
-  flight.cruise_m = world.start_W().z();
+  flight.bounds_W = space.bounds_W;
+  flight.goal_W = space.goal_W;
+  flight.cruise_m = space.cruise_m;
   const SensorRig rig = sitl::rig_of(config.simulator);
   if (const VehicleKey* key = out_of_bounds(flight.vehicle))
     throw InputError(fmt::format("vehicle: {}.{}: {} must be from {} to {}", key->table, key->key,
@@ -37,8 +37,9 @@ flight::FlightConfig flight_config_of(const sitl::World& world, const MissionCon
   for (std::size_t i = 0; i < rig.cameras.size(); ++i)
     if (rig.cameras[i].model == CameraModel::kClean)
       flight.depth_error[i] = {noise.noise_m, noise.noise_per_m};
-  if (const std::string why = sitl::why_no_room(world, flight.vehicle.radius_m); !why.empty())
-    throw InputError(why);
+  flight.stops_straight = config.autopilot.has_value();
+  if (config.autopilot)
+    flight.vehicle = as_flown_by(flight.vehicle, companion_config(*config.autopilot, flight.vehicle).planned);
   flight.seed = config.seed;
   const PrecisionLattice lattice = lattice_of(flight);
   flight.costs = core::on_lattice(flight.costs, lattice);
@@ -46,6 +47,16 @@ flight::FlightConfig flight_config_of(const sitl::World& world, const MissionCon
     for (governor::LatencyModel& model : flight.model)
       model = {core::on_lattice(model.fixed_s, lattice), core::on_lattice(model.slope_s_per_m3, lattice)};
   }
+  return flight;
+}
+
+flight::FlightConfig flight_config_of(const sitl::World& world, const MissionConfig& config) {
+  flight::FlightConfig flight =
+      flight_config_in({world.bounds_W(), config.route ? config.route->first_W() : world.goal_W(),
+                        config.route ? config.route->cruise_m : world.start_W().z()},
+                       config);
+  if (const std::string why = sitl::why_no_room(world, flight.vehicle.radius_m); !why.empty())
+    throw InputError(why);
   return flight;
 }
 
@@ -71,6 +82,11 @@ std::vector<std::string> beyond_reach(const sitl::World& world, const MissionCon
                    [](const auto& row) { return row.condition == governor::Condition::kBatteryLow; });
   const double usable_J = low->limit * vehicle.battery_J;
   std::vector<Vector3> goals_W{world.goal_W()};
+  if (config.route) {
+    goals_W.clear();
+    for (const RouteStep& step : config.route->steps)
+      if (step.goal_W) goals_W.push_back(*step.goal_W);
+  }
   for (const GivenGoals& given : config.goals)
     if (given.at_s == 0.0) goals_W = given.goals_W;
   std::vector<std::string> lines;

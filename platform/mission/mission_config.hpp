@@ -11,6 +11,8 @@
 #include "governor/failsafe/arbiter.hpp"
 #include "platform/board/backends.hpp"
 #include "platform/flight/flight_config.hpp"
+#include "platform/mission/autopilot_choice.hpp"
+#include "platform/mission/route.hpp"
 #include "platform/sitl/aircraft/simulated_aircraft.hpp"
 #include "platform/sitl/fault/fault_line.hpp"
 #include "platform/sitl/world/world.hpp"
@@ -65,22 +67,33 @@ struct MissionConfig {
   std::uint64_t seed{1};              ///< Of the planner, and of all noise, faults and gusts.
   flight::FlightConfig flight{};      ///< What the world gives (bounds, goal, height) is filled in from it.
   board::BackendNames backends{};
-  board::OwnParts own{};  ///< In the place of backends and governor; such a flight is not recorded.
+  board::OwnParts
+      own{};  ///< In the place of backends and governor; the log of such a flight does not replay.
   sitl::SimulatorConfig simulator{};
   /// What the stages cost on the machine that simulates, if that is known: a second price, beside flight.costs,
   /// of the work that map and planner say they did (work_check.hpp).
   std::optional<core::CostProfile> host_costs{};
   double host_factor{1.0};  ///< flight.costs are so many times those of the machine that was measured.
+  std::optional<AutopilotChoice> autopilot{};  ///< Who flies the vehicle; none: the runtime, to the motors.
   SlowDown slow_down{};
   JudgeConfig judge{};
+  std::optional<Route> route{};      ///< Flown in the place of the world's goal; goes without `goals`.
   std::vector<GivenGoals> goals{};   ///< Besides the world's, by time.
   std::vector<TimedFault> faults{};  ///< At most sitl::FaultLine::kMost.
-  std::string record{};              ///< File for the recording of the flight; empty: none.
+  std::string log{};                 ///< File for the log of the flight; empty: none.
   bool keep_known{false};            ///< report.known, at the height of the world's start.
   /// Called after every minor frame, may be empty: what a test measures.
   std::function<void(const FrameRecord&)> each_frame{};
 };
 
+/// Where a flight may be, where to, and how high it begins.
+struct FlightSpace {
+  Aabb bounds_W{};
+  Vector3 goal_W = Vector3::Zero();
+  double cruise_m{};
+};
+/// As below, without a look at the world.
+[[nodiscard]] flight::FlightConfig flight_config_in(const FlightSpace& space, const MissionConfig& config);
 /// The flight through `world`: its bounds, its goal, the height of its start, and the rest from `config`.
 /// Throws InputError for a rig that cannot be, and for a vehicle that has no room (sitl::why_no_room).
 [[nodiscard]] flight::FlightConfig flight_config_of(const sitl::World& world, const MissionConfig& config);

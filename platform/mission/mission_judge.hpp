@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <string>
 
 #include "core/geometry/fence.hpp"
 #include "platform/flight/flight_system.hpp"
@@ -31,8 +32,22 @@ class MissionJudge {
   [[nodiscard]] bool collided() const noexcept { return collided_; }
   [[nodiscard]] report::SafetyRecord& safety() noexcept { return safety_; }
 
+  /// A route: the goal of now is (not) the one where the mission ends; `waits`: at a place on purpose.
+  void on_route(bool is_last, bool waits, MonotonicTime now) noexcept {
+    is_last_ = is_last;
+    if (waits) best_at_ = now;
+  }
+
  private:
+  [[nodiscard]] bool is_last() const noexcept {
+    return is_last_ && system_.decision_program().goals().is_last();
+  }
   void watch(MonotonicTime now);
+  /// "collision" or "struck", with safety_.end; null: it touches nothing that it should not.
+  [[nodiscard]] const char* contact(MonotonicTime now);
+  /// Why a mission that the failsafe left alone is over or given up, with safety_.end; null: neither.
+  [[nodiscard]] const char* hopeless(MonotonicTime now);
+  const char* ends(const char* reason, std::string why);
   [[nodiscard]] const char* failsafe_reason(MonotonicTime now) const;
   /// Or needs not to, because the judge asks for no less.
   [[nodiscard]] bool believes_to_have_arrived() const;
@@ -47,6 +62,7 @@ class MissionJudge {
   const char* give_up_{nullptr};  ///< Why the vehicle stops where it is.
   bool collided_{false};
   bool left_ground_{false};
+  bool is_last_{true};
   double sink_mps_{0.0};
   double best_distance_m_{std::numeric_limits<double>::infinity()};
   Vector3 goal_W_ = Vector3::Zero();  ///< Of the time before.

@@ -8,13 +8,14 @@
 
 #include "platform/input/input_error.hpp"
 #include "platform/input/json_reader.hpp"
+#include "platform/report/build_identity.hpp"
 
 namespace roborun::mission {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::uint32_t kVersion = 3;
+constexpr std::uint32_t kVersion = 4;
 constexpr double kFarthest_m = 20e3;  // as in world files
 
 Json vector_json(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
@@ -149,6 +150,15 @@ std::vector<firmware_if::CameraMount> read_mounts(const Json& json, const char* 
 
 }  // namespace
 
+RecordedFlight recorded_flight_of(const flight::FlightConfig& flight, const MissionConfig& config,
+                                  std::span<firmware_if::DepthCamera* const> cameras,
+                                  std::span<firmware_if::Lidar* const> lidars) {
+  RecordedFlight recorded{flight, config.backends, config.slow_down, sitl::rig_of(config.simulator), {}, {}};
+  for (const firmware_if::DepthCamera* camera : cameras) recorded.mounts.push_back(camera->mount());
+  for (const firmware_if::Lidar* lidar : lidars) recorded.lidar_mounts.push_back(lidar->mount());
+  return recorded;
+}
+
 std::string to_json(const RecordedFlight& recorded) {
   const flight::FlightConfig& flight = recorded.flight;
   Json j;
@@ -184,8 +194,20 @@ std::string to_json(const RecordedFlight& recorded) {
   return j.dump();
 }
 
-RecordedFlight recorded_flight_from(std::span<const std::byte> json) {
-  const Json j = input::parse_json({reinterpret_cast<const char*>(json.data()), json.size()});
+void begin_log(log::FlightLog& log, const RecordedFlight& recorded, const std::string& why_not,
+               const std::string& profile, const std::optional<Vector3>& start_W) {
+  const report::BuildIdentity build = report::build_identity();
+  const log::StringMap identity{{"commit", std::string(build.commit)},
+                                {"compiler", std::string(build.compiler)},
+                                {"flags", std::string(build.flags)}};
+  Json json = {{"build", identity}, {"profile", profile}, {"replay", why_not}};
+  if (start_W) json["start_m"] = vector_json(*start_W);
+  json["flight"] = Json::parse(to_json(recorded));
+  log.configure(json.dump(), identity);
+}
+
+RecordedFlight recorded_flight_from(std::string_view json) {
+  const Json j = input::parse_json(json);
   if (j.at("roborun_recording") != kVersion) throw InputError("of another version");
   RecordedFlight recorded;
   flight::FlightConfig& flight = recorded.flight;

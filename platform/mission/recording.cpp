@@ -1,35 +1,30 @@
 #include "platform/mission/recording.hpp"
 
-#include <fmt/format.h>
-
-#include "platform/input/input_error.hpp"
-#include "platform/mission/recorded_flight.hpp"
-#include "platform/mission/recording_format.hpp"
+#include "platform/mission/decision_values.hpp"
 
 namespace roborun::mission {
 namespace {
 
-/// Throws if the flight depends on what does not cross the boundary.
-const std::string& recordable(const std::string& path, const MissionConfig& config) {
+/// A message of inputs spans so much of the flight.
+constexpr Nanos kBatch{100'000'000};
+/// ... or holds about so much.
+constexpr std::size_t kMostBatch_bytes = 1U << 20U;
+
+}  // namespace
+
+std::string why_not_replayed(const MissionConfig& config) {
+  if (config.autopilot) return "inputs are sensors, and an autopilot flew it";
+  if (config.route) return "inputs hold goals, and a route sets speeds too";
   if (!config.own.empty() || uses_plugin(config.backends))
-    throw InputError(
-        fmt::format("{}: a recording is flown again without code of others: must be a flight with map, "
-                    "planner and ways by name",
-                    path));
+    return "map, planner, policy or ways were code of others";
   for (const TimedFault& f : config.faults) {
     for (const sitl::Component component :
          {sitl::Component::kCpu, sitl::Component::kPlanner, sitl::Component::kMap}) {
-      if (f.fault.component == component)
-        throw InputError(
-            fmt::format("{}: a recording holds inputs alone: must be a flight without faults of cpu, "
-                        "planner or map",
-                        path));
+      if (f.fault.component == component) return "it had a fault of cpu, planner or map, which is no input";
     }
   }
-  return path;
+  return {};
 }
-
-}  // namespace
 
 void FlightDigest::add_motors_off() noexcept { hash_.add(std::uint64_t{0x0FF}); }
 
@@ -46,11 +41,7 @@ void FlightDigest::add(const flight::DecisionOutput& d) noexcept {
   hash_.add(static_cast<std::uint64_t>(point.p1_level));
   hash_.add(point.speed_limit_mps);
   if (d.kind == flight::DecisionKind::kKeep) return;
-  hash_.add(static_cast<std::uint64_t>(d.trajectory.start_time.time_since_epoch().count()));
-  for (std::size_t i = 0; i < d.trajectory.segment_count; ++i) {
-    hash_.add(d.trajectory.segment[i].duration_s);
-    for (const Vector3& c : d.trajectory.segment[i].coefficient) hash_.add(c);
-  }
+  hash_.add(hash_of(d.trajectory));
 }
 
 std::uint64_t FlightDigest::value(const stages::OccupancyMap& map) const noexcept {
@@ -66,8 +57,8 @@ class FlightRecorder::Tap final : public Device {
   [[nodiscard]] Status read(Sample& sample) noexcept override {
     const Status status = device_.read(sample);
     if (status == Status::kOk) {
-      each_field(Put(recorder_.payload_), sample);
-      recorder_.write(kind_of(&sample));
+      each_field(PutField(recorder_.payload_), sample);
+      recorder_.add(kind_of(&sample));
     }
     return status;
   }
@@ -84,11 +75,11 @@ class FlightRecorder::TappedCamera final : public firmware_if::DepthCamera {
   [[nodiscard]] Status read(firmware_if::DepthFrame& frame) noexcept override {
     const Status status = camera_.read(frame);
     if (status != Status::kOk) return status;
-    Put put(recorder_.payload_);
+    PutField put(recorder_.payload_);
     put(index_);
     each_field(put, frame);
     for (const float depth_m : frame.depth_m) put(depth_m);
-    recorder_.write(RecordKind::kDepth);
+    recorder_.add(RecordKind::kDepth);
     return status;
   }
   [[nodiscard]] const firmware_if::CameraMount& mount() const noexcept override { return camera_.mount(); }
@@ -106,12 +97,12 @@ class FlightRecorder::TappedLidar final : public firmware_if::Lidar {
   [[nodiscard]] Status read(firmware_if::LidarSweep& sweep) noexcept override {
     const Status status = lidar_.read(sweep);
     if (status != Status::kOk) return status;
-    Put put(recorder_.payload_);
+    PutField put(recorder_.payload_);
     put(index_);
     each_field(put, sweep);
     for (const auto& point : sweep.points_L_m)
       for (const float x : point) put(x);
-    recorder_.write(RecordKind::kLidar);
+    recorder_.add(RecordKind::kLidar);
     return status;
   }
   [[nodiscard]] const firmware_if::CameraMount& mount() const noexcept override { return lidar_.mount(); }
@@ -124,103 +115,104 @@ class FlightRecorder::TappedLidar final : public firmware_if::Lidar {
 
 class FlightRecorder::TappedMotors final : public firmware_if::Motors {
  public:
-  TappedMotors(FlightDigest& digest, firmware_if::Motors& motors) : digest_(digest), motors_(motors) {}
+  TappedMotors(FlightRecorder& recorder, firmware_if::Motors& motors)
+      : recorder_(recorder), motors_(motors) {}
   [[nodiscard]] Status command(const firmware_if::MotorCommand& command) noexcept override {
-    digest_.add(command);
+    recorder_.digest_.add(command);
+    MotorsCheck check = check_of(command);
+    each_field(PutField(recorder_.payload_), check);
+    recorder_.add(RecordKind::kMotors);
     return motors_.command(command);
   }
 
  private:
-  FlightDigest& digest_;
+  FlightRecorder& recorder_;
   firmware_if::Motors& motors_;
 };
 
-FlightRecorder::FlightRecorder(const std::string& path, const flight::FlightConfig& flight,
-                               const MissionConfig& config, flight::Aircraft& aircraft,
+FlightRecorder::FlightRecorder(log::FlightLog& log, flight::Aircraft& aircraft,
                                std::span<firmware_if::DepthCamera* const> cameras,
                                std::span<firmware_if::Lidar* const> lidars)
-    : file_(recordable(path, config)), aircraft_(aircraft) {
+    : log_(log), aircraft_(aircraft) {
   imu_ = std::make_unique<Tap<firmware_if::Imu, firmware_if::ImuSample>>(*this, aircraft.imu());
   gnss_ = std::make_unique<Tap<firmware_if::Gnss, firmware_if::GnssFix>>(*this, aircraft.gnss());
   barometer_ = std::make_unique<Tap<firmware_if::Barometer, firmware_if::BarometerSample>>(
       *this, aircraft.barometer());
   if (firmware_if::Odometry* odometry = aircraft.odometry())
     odometry_ = std::make_unique<Tap<firmware_if::Odometry, firmware_if::OdometrySample>>(*this, *odometry);
-  motors_ = std::make_unique<TappedMotors>(digest_, aircraft.motors());
-  RecordedFlight recorded{flight, config.backends, config.slow_down, sitl::rig_of(config.simulator), {}, {}};
+  motors_ = std::make_unique<TappedMotors>(*this, aircraft.motors());
   for (firmware_if::DepthCamera* camera : cameras) {
     camera_.push_back(
         std::make_unique<TappedCamera>(*this, *camera, static_cast<std::uint32_t>(camera_.size())));
     cameras_.push_back(camera_.back().get());
-    recorded.mounts.push_back(camera->mount());
   }
   for (firmware_if::Lidar* lidar : lidars) {
     lidar_.push_back(std::make_unique<TappedLidar>(*this, *lidar, static_cast<std::uint32_t>(lidar_.size())));
     lidars_.push_back(lidar_.back().get());
-    recorded.lidar_mounts.push_back(lidar->mount());
   }
-  const std::string start = to_json(recorded);
-  const auto* bytes = reinterpret_cast<const std::byte*>(start.data());
-  payload_.assign(bytes, bytes + start.size());
-  write(RecordKind::kStart);
 }
-
-firmware_if::Imu& FlightRecorder::imu() noexcept { return *imu_; }
-firmware_if::Gnss& FlightRecorder::gnss() noexcept { return *gnss_; }
-firmware_if::Barometer& FlightRecorder::barometer() noexcept { return *barometer_; }
-firmware_if::Motors& FlightRecorder::motors() noexcept { return *motors_; }
 
 flight::AircraftHealth FlightRecorder::health(MonotonicTime now) noexcept {
   flight::AircraftHealth health = aircraft_.health(now);
-  each_field(Put(payload_), health);
-  write(RecordKind::kHealth);
+  each_field(PutField(payload_), health);
+  add(RecordKind::kHealth);
   return health;
 }
 
 void FlightRecorder::terminate() noexcept {
   digest_.add_motors_off();
+  add(RecordKind::kMotorsOff);
   aircraft_.terminate();
 }
 
 void FlightRecorder::disarm() noexcept {
   digest_.add_motors_off();
+  add(RecordKind::kMotorsOff);
   aircraft_.disarm();
 }
 
 void FlightRecorder::begin_frame(MonotonicTime now) noexcept {
   aircraft_.begin_frame(now);
+  // Whole frames: a log that is cut replays to the end of one.
+  if (now - batch_begin_ >= kBatch || batch_.bytes() >= kMostBatch_bytes) {
+    flush();
+    batch_begin_ = now;
+  }
+  now_ = now;
   ++totals_.minor_frames;
-  each_field(Put(payload_), now);
-  write(RecordKind::kFrame);
+  each_field(PutField(payload_), now);
+  add(RecordKind::kFrame);
 }
 
 void FlightRecorder::gave_goals(std::span<const Vector3> goals_W) noexcept {
-  Put put(payload_);
+  PutField put(payload_);
   for (const Vector3& p_W : goals_W)
     for (int i = 0; i < 3; ++i) put(p_W[i]);
-  write(RecordKind::kGoals);
+  add(RecordKind::kGoals);
 }
 
 void FlightRecorder::decided(const flight::DecisionOutput& decision) noexcept {
   ++totals_.decisions;
   digest_.add(decision);
+  PutField put(payload_);
+  for (const std::uint64_t value : values_of(decision)) put(value);
+  add(RecordKind::kDecision);
 }
 
-void FlightRecorder::write(RecordKind kind) noexcept {
-  const std::array<std::uint32_t, 2> head{static_cast<std::uint32_t>(kind),
-                                          static_cast<std::uint32_t>(payload_.size())};
-  checksum_ = checksum(checksum_, kind, payload_);
-  file_.write({reinterpret_cast<const char*>(head.data()), sizeof head});
-  file_.write({reinterpret_cast<const char*>(payload_.data()), payload_.size()});
-  file_.write({reinterpret_cast<const char*>(&checksum_), sizeof checksum_});
+void FlightRecorder::add(RecordKind kind) noexcept {
+  batch_.add(kind, payload_);
   payload_.clear();
 }
 
-void FlightRecorder::finish(const stages::OccupancyMap& map) {
+void FlightRecorder::flush() noexcept {
+  if (!batch_.is_empty()) log_.inputs(now_.time_since_epoch().count(), batch_.take());
+}
+
+void FlightRecorder::finish(const stages::OccupancyMap& map) noexcept {
   totals_.digest = digest_.value(map);
-  each_field(Put(payload_), totals_);
-  write(RecordKind::kEnd);
-  file_.commit();
+  each_field(PutField(payload_), totals_);
+  add(RecordKind::kEnd);
+  flush();
 }
 
 }  // namespace roborun::mission

@@ -1,10 +1,6 @@
-/// The recording of a flight: every input that crossed the boundary (`firmware_if`), in the order in which
-/// the lanes read it, and the digest of what they did with it. A file of records:
-///   u32 kind | u32 bytes | payload | u64 checksum over all three and the checksum before
-/// in the byte order of x86-64 and AArch64. Records: kStart (configuration as JSON), for each minor frame
-/// kFrame (its instant) and the samples, health, images and sweeps read in it, kGiveUp, kEnd (digest, minor frames,
-/// decisions). Faults of sensors, battery, link, ESCs, bus, kill switch and wind are in what was read; faults
-/// of the computer itself (cpu, planner, map) are no input, and such a flight is refused.
+/// The inputs of a flight on their way into its log: every input that crossed the boundary (`firmware_if`), in the order in
+/// which the lanes read it, and what they did with it. Faults of sensors, battery, link, ESCs, bus, kill switch and wind are in what
+/// was read; faults of the computer itself (cpu, planner, map) are no input: the log of such a flight holds none.
 #pragma once
 
 #include <cstdint>
@@ -18,27 +14,12 @@
 #include "firmware_if/lidar.hpp"
 #include "platform/flight/aircraft.hpp"
 #include "platform/flight/decision_pipeline.hpp"
-#include "platform/input/output_file.hpp"
+#include "platform/log/flight_log.hpp"
+#include "platform/mission/inputs_format.hpp"
 #include "platform/mission/mission_config.hpp"
 #include "stages/perception/occupancy_map.hpp"
 
 namespace roborun::mission {
-
-enum class RecordKind : std::uint32_t {
-  kStart,
-  kFrame,
-  kImu,
-  kGnss,
-  kBarometer,
-  kHealth,
-  kDepth,
-  kGiveUp,
-  kEnd,
-  kLidar,
-  kOdometry,
-  kGoals  ///< Goals given in flight.
-};
-inline constexpr std::size_t kRecordKinds = 12;
 
 /// What a flight did: every motor command, "motors off" and decision as they came, the map in the end.
 class FlightDigest {
@@ -52,29 +33,29 @@ class FlightDigest {
   core::StateHash hash_;
 };
 
-struct FlightTotals {
-  std::uint64_t digest{}, minor_frames{}, decisions{};
-  bool operator==(const FlightTotals&) const = default;
-};
+/// Empty, or why a flight cannot be flown again from inputs alone.
+[[nodiscard]] std::string why_not_replayed(const MissionConfig& config);
 
-/// Stands between a flight and its aircraft and cameras, and writes what passes. The constructor and finish()
-/// throw InputError if the file cannot be written, or the flight has a fault that no recording holds.
+/// Stands between a flight and its aircraft and cameras, and writes what passes into `log`, which outlives it.
 class FlightRecorder final : private flight::Aircraft {
  public:
-  FlightRecorder(const std::string& path, const flight::FlightConfig& flight, const MissionConfig& config,
-                 flight::Aircraft& aircraft, std::span<firmware_if::DepthCamera* const> cameras,
+  FlightRecorder(log::FlightLog& log, flight::Aircraft& aircraft,
+                 std::span<firmware_if::DepthCamera* const> cameras,
                  std::span<firmware_if::Lidar* const> lidars = {});
+
+  /// What is left, of a flight that was broken off.
+  ~FlightRecorder() override { flush(); }
+  FlightRecorder(const FlightRecorder&) = delete;
+  FlightRecorder& operator=(const FlightRecorder&) = delete;
 
   [[nodiscard]] flight::Aircraft& aircraft() noexcept { return *this; }
   [[nodiscard]] std::span<firmware_if::DepthCamera* const> cameras() noexcept { return cameras_; }
   [[nodiscard]] std::span<firmware_if::Lidar* const> lidars() noexcept { return lidars_; }
   void decided(const flight::DecisionOutput& decision) noexcept;
-  void gave_up() noexcept { write(RecordKind::kGiveUp); }
+  void gave_up() noexcept { add(RecordKind::kGiveUp); }
   void gave_goals(std::span<const Vector3> goals_W) noexcept;
-  /// Throws InputError if anything could not be written so far.
-  void check() const { file_.check(); }
-  /// Only now the file has its name: without this call the file before stays.
-  void finish(const stages::OccupancyMap& map);
+  /// What is left, and the totals. Nothing may follow.
+  void finish(const stages::OccupancyMap& map) noexcept;
 
  private:
   template <typename Device, typename Sample>
@@ -84,22 +65,24 @@ class FlightRecorder final : private flight::Aircraft {
   class TappedMotors;
 
   void begin_frame(MonotonicTime now) noexcept override;
-  [[nodiscard]] firmware_if::Imu& imu() noexcept override;
-  [[nodiscard]] firmware_if::Gnss& gnss() noexcept override;
-  [[nodiscard]] firmware_if::Barometer& barometer() noexcept override;
+  [[nodiscard]] firmware_if::Imu& imu() noexcept override { return *imu_; }
+  [[nodiscard]] firmware_if::Gnss& gnss() noexcept override { return *gnss_; }
+  [[nodiscard]] firmware_if::Barometer& barometer() noexcept override { return *barometer_; }
   [[nodiscard]] firmware_if::Odometry* odometry() noexcept override { return odometry_.get(); }
-  [[nodiscard]] firmware_if::Motors& motors() noexcept override;
+  [[nodiscard]] firmware_if::Motors& motors() noexcept override { return *motors_; }
   [[nodiscard]] flight::AircraftHealth health(MonotonicTime now) noexcept override;
   void terminate() noexcept override;
   void disarm() noexcept override;
   void end_frame(MonotonicTime now) noexcept override { aircraft_.end_frame(now); }
   /// Ends the record that was put together since the one before.
-  void write(RecordKind kind) noexcept;
+  void add(RecordKind kind) noexcept;
+  void flush() noexcept;
 
-  input::OutputFile file_;
+  log::FlightLog& log_;
   flight::Aircraft& aircraft_;
-  std::vector<std::byte> payload_;
-  std::uint64_t checksum_{0};
+  InputBatch batch_;
+  MonotonicTime batch_begin_{}, now_{};
+  std::string payload_;
   FlightDigest digest_;
   FlightTotals totals_;
   std::unique_ptr<firmware_if::Imu> imu_;

@@ -2,99 +2,153 @@
 
 #include <fmt/format.h>
 
+#include <memory>
+#include <vector>
+
 #include "platform/flight/lockstep_flight.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/input/json_reader.hpp"
+#include "platform/log/flight_log.hpp"
+#include "platform/mission/decision_values.hpp"
 #include "platform/mission/flight_setup.hpp"
-#include "platform/mission/recording_format.hpp"
 
 namespace roborun::mission {
-namespace {
 
-constexpr std::uint32_t kMostStart = 1U << 16U;
-constexpr std::uint32_t kDepthHead = 4 + 8 + 4 + 2 + 2 + 4 * 4;
-constexpr std::uint32_t kMostDepth = kDepthHead + 1280 * 1280 * 4;
-constexpr std::uint32_t kLidarHead = 4 + 8 + 4 + 2 * 4;
-constexpr std::uint32_t kMostLidar = kLidarHead + 256 * 4096 * 12;
-struct Size {
-  std::uint32_t least, most;
-};
-constexpr std::uint32_t kGoal = 24;
-constexpr std::array<Size, kRecordKinds> kSizes{{{2, kMostStart},
-                                                 {8, 8},
-                                                 {60, 60},
-                                                 {100, 100},
-                                                 {20, 20},
-                                                 {18, 18},
-                                                 {kDepthHead, kMostDepth},
-                                                 {0, 0},
-                                                 {24, 24},
-                                                 {kLidarHead, kMostLidar},
-                                                 {117, 117},
-                                                 {kGoal, flight::GoalQueue::kMost* kGoal}}};
-
-}  // namespace
-
-Recording::Recording(const std::string& path) : path_(path), file_(path, "a file of roborun fly --record") {
-  read_record();
-  if (!error_.empty()) throw InputError(error_);
-  try {
-    if (kind_ != RecordKind::kStart) throw InputError("it does not begin with a configuration");
-    flight_ = recorded_flight_from(payload_);
-  } catch (const std::exception& error) {
-    throw InputError(fmt::format("{}: no recording of this program: {}", path, error.what()));
-  }
+Recording::Recording(const std::string& path) : path_(path), reader_(path) {
+  bool found = false;
+  for (log::Message message; !found && reader_.next(message);) found = read_configuration(message);
+  if (!found)
+    throw InputError(reader_.damage().empty()
+                         ? fmt::format("{}: no log of a flight: it holds no configuration", path)
+                         : reader_.damage());
   next();
 }
 
-void Recording::break_off(const std::string& why) {
-  error_ = fmt::format("{}: byte {}: {}", path_, position_, why);
-  kind_ = RecordKind::kEnd;
-  payload_.clear();
-}
-
-void Recording::read_record() noexcept {
+bool Recording::read_configuration(const log::Message& message) {
+  if (message.channel->topic != "/configuration") return false;
+  std::string why;
   try {
-    try_to_read_record();
-  } catch (const std::exception& error) {  // the file, or memory
-    break_off(error.what());
+    const nlohmann::ordered_json json = input::parse_json(message.data);
+    why = json.at("replay").get<std::string>();
+    if (why.empty()) flight_ = recorded_flight_from(json.at("flight").dump());
+  } catch (const std::exception& error) {
+    throw InputError(fmt::format("{}: no log of a flight of this program: {}", path_, error.what()));
   }
+  if (!why.empty()) throw InputError(fmt::format("{}: holds no inputs to replay: {}", path_, why));
+  return true;
 }
 
-void Recording::try_to_read_record() {
-  std::array<std::uint32_t, 2> head{};
-  const auto read = [this](void* to, std::size_t bytes) {
-    return file_.read({static_cast<char*>(to), bytes}) == bytes;
-  };
-  if (!read(head.data(), sizeof head)) return break_off("cut off: the recording has no end");
-  const auto [kind, bytes] = head;
-  if (kind >= kRecordKinds || bytes < kSizes[kind].least || bytes > kSizes[kind].most)
-    return break_off("this is no record of a flight");
-  kind_ = static_cast<RecordKind>(kind);
-  payload_.resize(bytes);
-  std::uint64_t sum = 0;
-  if (!read(payload_.data(), bytes) || !read(&sum, sizeof sum))
-    return break_off("cut off in the middle of a record");
-  checksum_ = checksum(checksum_, kind_, payload_);
-  if (sum != checksum_) return break_off("damaged: the checksum differs");
-  char more = 0;
-  if (kind_ == RecordKind::kEnd && read(&more, 1)) {
-    position_ += sizeof head + bytes + sizeof sum;
-    return break_off("something follows the end of the recording");
+void Recording::break_off(const std::string& why) {
+  damage_ = why;
+  kind_ = RecordKind::kEnd;
+  payload_ = {};
+}
+
+void Recording::read_message() {
+  for (log::Message message; reader_.next(message);) {
+    if (message.channel->message_encoding != log::FlightLog::kInputsEncoding) continue;
+    if (message.sequence != sequence_++)
+      return break_off(fmt::format("{}: inputs are missing before {:.3f} s: they were not written", path_,
+                                   1e-9 * static_cast<double>(message.log_ns)));
+    try {
+      inputs_ = records_from(message.data);
+    } catch (const InputError& error) {
+      return break_off(fmt::format("{}: at {:.3f} s: {}", path_, 1e-9 * static_cast<double>(message.log_ns),
+                                   error.what()));
+    }
+    at_ = 0;
+    if (!inputs_.records.empty()) return;
   }
-  position_ += sizeof head + bytes + sizeof sum;
+  break_off(reader_.damage().empty() ? fmt::format("{}: the inputs end before the flight", path_)
+                                     : reader_.damage());
 }
 
-void Recording::next() noexcept {
-  if (kind_ != RecordKind::kEnd) read_record();
+void Recording::end() {
+  GetField get(payload_);
+  each_field(get, totals_);
+  if (at_ < inputs_.records.size())
+    return break_off(fmt::format("{}: inputs behind the end of the flight", path_));
+  for (log::Message message; reader_.next(message);) {
+  }
+  damage_ = reader_.damage();
 }
 
-FlightTotals Recording::totals() const noexcept {
-  FlightTotals totals;
-  each_field(Get(payload_), totals);
-  return totals;
+void Recording::next() {
+  if (kind_ == RecordKind::kEnd) return;
+  if (at_ == inputs_.records.size()) read_message();
+  if (kind_ == RecordKind::kEnd) return;
+  const InputRecord& record = inputs_.records[at_++];
+  kind_ = record.kind;
+  payload_ = std::string_view(inputs_.payloads).substr(record.at, record.bytes);
+  if (kind_ == RecordKind::kEnd) end();
 }
 
 namespace {
+
+/// The first difference of a replay, if there is one by now.
+class Comparison {
+ public:
+  explicit Comparison(Recording& recording) : recording_(recording) {}
+  void differ(std::string stage, std::string what, std::string recorded, std::string replayed) {
+    if (!first_)
+      first_ = {0, 0.0, std::move(stage), std::move(what), std::move(recorded), std::move(replayed)};
+  }
+  /// The flight did this now: was it recorded, too? Then its payload is read next.
+  [[nodiscard]] bool expects(RecordKind kind, const char* stage, const char* what) {
+    if (recording_.kind() == kind) return true;
+    differ(stage, what, "none", "one");
+    return false;
+  }
+  void motors(const firmware_if::MotorCommand& command) {
+    if (first_ || !expects(RecordKind::kMotors, "track", "motor command")) return;
+    MotorsCheck recorded;
+    each_field(GetField(recording_.payload()), recorded);
+    const MotorsCheck replayed = check_of(command);
+    for (std::size_t i = 0; i < recorded.ratio.size() && !first_; ++i)
+      if (recorded.ratio[i] != replayed.ratio[i])
+        differ("track", fmt::format("motor {}", i + 1), fmt::format("{:.5f}", recorded.ratio[i] / 65535.0),
+               fmt::format("{:.5f}", replayed.ratio[i] / 65535.0));
+    if (!first_ && recorded.crc != replayed.crc)
+      differ("track", "motor command", fmt::format("CRC-32 {:08x}", recorded.crc),
+             fmt::format("CRC-32 {:08x}, the same to five digits", replayed.crc));
+    recording_.next();
+  }
+  void motors_off() {
+    if (!first_ && expects(RecordKind::kMotorsOff, "track", "motors off")) recording_.next();
+  }
+  void decision(const flight::DecisionOutput& decision) {
+    if (first_ || !expects(RecordKind::kDecision, "gather", "decision")) return;
+    GetField get(recording_.payload());
+    const DecisionValues replayed = values_of(decision);
+    for (std::size_t i = 0; i < replayed.size(); ++i) {
+      std::uint64_t recorded = 0;
+      get(recorded);
+      if (recorded != replayed[i])
+        differ(name_of_value(i).stage, name_of_value(i).name, text_of_value(i, recorded),
+               text_of_value(i, replayed[i]));
+    }
+    recording_.next();
+  }
+  /// At the end of a minor frame: what was recorded of it is used up.
+  void frame_done() {
+    const RecordKind kind = recording_.kind();
+    if (kind == RecordKind::kFrame || kind == RecordKind::kGoals || kind == RecordKind::kEnd) return;
+    const bool decision = kind == RecordKind::kDecision;
+    const bool motors = kind == RecordKind::kMotors || kind == RecordKind::kMotorsOff;
+    differ(decision ? "gather"
+           : motors ? "track"
+                    : "inputs",
+           decision ? "decision"
+           : motors ? "motor command"
+                    : "a record",
+           decision || motors ? "one" : "read", decision || motors ? "none" : "not read");
+  }
+  [[nodiscard]] std::optional<ReplayDifference>& first() noexcept { return first_; }
+
+ private:
+  Recording& recording_;
+  std::optional<ReplayDifference> first_;
+};
 
 template <typename Device, typename Sample>
 class ReplayedSensor final : public Device {
@@ -102,7 +156,7 @@ class ReplayedSensor final : public Device {
   explicit ReplayedSensor(Recording& recording) : recording_(recording) {}
   [[nodiscard]] Status read(Sample& sample) noexcept override {
     if (recording_.kind() != kind_of(&sample)) return Status::kNotReady;
-    each_field(Get(recording_.payload()), sample);
+    each_field(GetField(recording_.payload()), sample);
     recording_.next();
     return Status::kOk;
   }
@@ -117,7 +171,7 @@ class ReplayedCamera final : public firmware_if::DepthCamera {
       : recording_(recording), index_(index), mount_(recording.flight().mounts[index]) {}
   [[nodiscard]] Status read(firmware_if::DepthFrame& frame) noexcept override {
     if (recording_.kind() != RecordKind::kDepth) return Status::kNotReady;
-    Get get(recording_.payload());
+    GetField get(recording_.payload());
     std::uint32_t index = 0;
     get(index);
     if (index != index_) return Status::kNotReady;
@@ -144,7 +198,7 @@ class ReplayedLidar final : public firmware_if::Lidar {
       : recording_(recording), index_(index), mount_(recording.flight().lidar_mounts[index]) {}
   [[nodiscard]] Status read(firmware_if::LidarSweep& sweep) noexcept override {
     if (recording_.kind() != RecordKind::kLidar) return Status::kNotReady;
-    Get get(recording_.payload());
+    GetField get(recording_.payload());
     std::uint32_t index = 0;
     get(index);
     if (index != index_) return Status::kNotReady;
@@ -166,17 +220,19 @@ class ReplayedLidar final : public firmware_if::Lidar {
 
 class ReplayedAircraft final : public flight::Aircraft, private firmware_if::Motors {
  public:
-  ReplayedAircraft(Recording& recording, FlightDigest& digest)
+  ReplayedAircraft(Recording& recording, FlightDigest& digest, Comparison& comparison)
       : recording_(recording),
         digest_(digest),
+        comparison_(comparison),
         imu_(recording),
         gnss_(recording),
         barometer_(recording),
         odometry_(recording) {}
   void begin_frame(MonotonicTime now) noexcept override {
     MonotonicTime recorded;
-    each_field(Get(recording_.payload()), recorded);
-    same_inputs = recorded == now;
+    each_field(GetField(recording_.payload()), recorded);
+    if (recorded != now)
+      comparison_.differ("inputs", "instant of the minor frame", text_of(recorded), text_of(now));
     recording_.next();
   }
   [[nodiscard]] firmware_if::Imu& imu() noexcept override { return imu_; }
@@ -188,99 +244,144 @@ class ReplayedAircraft final : public flight::Aircraft, private firmware_if::Mot
   [[nodiscard]] flight::AircraftHealth health(MonotonicTime) noexcept override {
     flight::AircraftHealth health;
     if (recording_.kind() == RecordKind::kHealth) {
-      each_field(Get(recording_.payload()), health);
+      each_field(GetField(recording_.payload()), health);
       recording_.next();
     } else {
-      same_inputs = false;
+      comparison_.differ("inputs", "health", "not asked for", "asked for");
     }
     return health;
   }
-  void terminate() noexcept override { digest_.add_motors_off(); }
-  void disarm() noexcept override { digest_.add_motors_off(); }
+  void terminate() noexcept override { off(); }
+  void disarm() noexcept override { off(); }
   void end_frame(MonotonicTime) noexcept override {}
-  bool same_inputs{true};  ///< As far as this minor frame got.
 
  private:
+  [[nodiscard]] static std::string text_of(MonotonicTime time) {
+    return fmt::format("{:.6f} s", seconds(time.time_since_epoch()));
+  }
   [[nodiscard]] Status command(const firmware_if::MotorCommand& command) noexcept override {
     digest_.add(command);
+    comparison_.motors(command);
     return Status::kOk;
+  }
+  void off() {
+    digest_.add_motors_off();
+    comparison_.motors_off();
   }
   Recording& recording_;
   FlightDigest& digest_;
+  Comparison& comparison_;
   ReplayedSensor<firmware_if::Imu, firmware_if::ImuSample> imu_;
   ReplayedSensor<firmware_if::Gnss, firmware_if::GnssFix> gnss_;
   ReplayedSensor<firmware_if::Barometer, firmware_if::BarometerSample> barometer_;
   ReplayedSensor<firmware_if::Odometry, firmware_if::OdometrySample> odometry_;
 };
 
-}  // namespace
+/// The recorded devices of a kind, and pointers to them.
+template <typename Replayed, typename Device>
+struct Devices {
+  Devices(Recording& recording, std::size_t count) {
+    device.reserve(count);
+    for (std::uint32_t i = 0; i < count; ++i) device.emplace_back(recording, i);
+    for (Replayed& one : device) pointers.push_back(&one);
+  }
+  std::vector<Replayed> device;
+  std::vector<Device*> pointers;
+};
 
-ReplayResult replay_flight(const std::string& path, const std::function<void(double)>& progress) {
-  Recording recording(path);
-  FlightDigest digest;
-  ReplayedAircraft aircraft(recording, digest);
-  const RecordedFlight& recorded = recording.flight();
-  std::vector<ReplayedCamera> camera;
-  camera.reserve(recorded.mounts.size());
-  for (std::uint32_t i = 0; i < recorded.mounts.size(); ++i) camera.emplace_back(recording, i);
-  std::vector<firmware_if::DepthCamera*> cameras;
-  cameras.reserve(camera.size());
-  for (ReplayedCamera& c : camera) cameras.push_back(&c);
-  std::vector<ReplayedLidar> lidar;
-  lidar.reserve(recorded.lidar_mounts.size());
-  for (std::uint32_t i = 0; i < recorded.lidar_mounts.size(); ++i) lidar.emplace_back(recording, i);
-  std::vector<firmware_if::Lidar*> lidars;
-  lidars.reserve(lidar.size());
-  for (ReplayedLidar& l : lidar) lidars.push_back(&l);
-  FlightSetup setup(
-      recorded.flight, recorded.backends,
-      board::image_limits(recorded.sensors, recorded.flight.vehicle, lattice_of(recorded.flight)));
-  const auto flight = std::make_unique<flight::LockstepFlight>(recorded.flight, aircraft, cameras,
-                                                               setup.parts(), setup.arena(), lidars);
-  setup.check();
-  ReplayResult result;
+class Replay {
+ public:
+  explicit Replay(const std::string& path);
+  ReplayResult run(const std::function<void(double)>& progress, double until_s);
+
+ private:
+  void give_goals();
+  void step();
+
+  Recording recording_;
+  FlightDigest digest_;
+  Comparison comparison_;
+  ReplayedAircraft aircraft_;
+  Devices<ReplayedCamera, firmware_if::DepthCamera> cameras_;
+  Devices<ReplayedLidar, firmware_if::Lidar> lidars_;
+  FlightSetup setup_;
+  flight::LockstepFlight flight_;
+  ReplayResult result_;
+};
+
+Replay::Replay(const std::string& path)
+    : recording_(path),
+      comparison_(recording_),
+      aircraft_(recording_, digest_, comparison_),
+      cameras_(recording_, recording_.flight().mounts.size()),
+      lidars_(recording_, recording_.flight().lidar_mounts.size()),
+      setup_(recording_.flight().flight, recording_.flight().backends,
+             board::image_limits(recording_.flight().sensors, recording_.flight().flight.vehicle,
+                                 lattice_of(recording_.flight().flight))),
+      flight_(recording_.flight().flight, aircraft_, cameras_.pointers, setup_.parts(), setup_.arena(),
+              lidars_.pointers) {
+  setup_.check();
+}
+
+void Replay::give_goals() {
+  GetField get(recording_.payload());
+  std::vector<Vector3> goals_W;
+  while (get.rest().size() >= kGoal_bytes && goals_W.size() < flight::GoalQueue::kMost) {
+    Vector3& p_W = goals_W.emplace_back();
+    for (int i = 0; i < 3; ++i) get(p_W[i]);
+  }
+  (void)flight_.system().decision_program().give_goals(goals_W);
+  recording_.next();
+}
+
+void Replay::step() {
+  const RecordedFlight& recorded = recording_.flight();
+  ++result_.replayed.minor_frames;
+  if (const flight::DecisionOutput* decision =
+          flight_.step({.slower = recorded.slow_down.slower(flight_.now() + recorded.flight.minor_frame)})) {
+    ++result_.replayed.decisions;
+    digest_.add(*decision);
+    comparison_.decision(*decision);
+  }
+  if (recording_.kind() == RecordKind::kGiveUp) {
+    flight_.system().decision_program().give_up();
+    recording_.next();
+  }
+  comparison_.frame_done();
+  result_.seconds = seconds(flight_.now().time_since_epoch());
+}
+
+ReplayResult Replay::run(const std::function<void(double)>& progress, double until_s) {
   double told_s = 0.0;
-  const auto give_goals = [&] {
-    Get get(recording.payload());
-    std::vector<Vector3> goals_W;
-    while (get.rest().size() >= 3 * sizeof(double) && goals_W.size() < flight::GoalQueue::kMost) {
-      Vector3& p_W = goals_W.emplace_back();
-      for (int i = 0; i < 3; ++i) get(p_W[i]);
-    }
-    (void)flight->system().decision_program().give_goals(goals_W);
-    recording.next();
-  };
-  // They come before the frame from which on they are there.
-  while (recording.kind() == RecordKind::kFrame || recording.kind() == RecordKind::kGoals) {
-    if (recording.kind() == RecordKind::kGoals) {
+  // Goals come before the frame from which on they are there.
+  while (recording_.kind() == RecordKind::kFrame || recording_.kind() == RecordKind::kGoals) {
+    if (recording_.kind() == RecordKind::kGoals) {
       give_goals();
       continue;
     }
-    ++result.replayed.minor_frames;
-    if (const flight::DecisionOutput* decision = flight->step(
-            {.slower = recorded.slow_down.slower(flight->now() + recorded.flight.minor_frame)})) {
-      ++result.replayed.decisions;
-      digest.add(*decision);
-    }
-    if (recording.kind() == RecordKind::kGiveUp) {
-      flight->system().decision_program().give_up();
-      recording.next();
-    }
-    if (!recording.error().empty()) throw InputError(recording.error());
-    const bool all_read = recording.kind() == RecordKind::kFrame || recording.kind() == RecordKind::kGoals ||
-                          recording.kind() == RecordKind::kEnd;
-    if (!all_read || !aircraft.same_inputs) {
-      result.diverged_in = result.replayed.minor_frames;
-      break;
-    }
-    result.seconds = seconds(flight->now().time_since_epoch());
-    if (progress && result.seconds >= told_s + 1.0) progress(told_s = result.seconds);
+    if (seconds((flight_.now() + recording_.flight().flight.minor_frame).time_since_epoch()) > until_s) break;
+    step();
+    if (comparison_.first()) break;
+    if (progress && result_.seconds >= told_s + 1.0) progress(told_s = result_.seconds);
   }
-  if (result.diverged_in != 0) return result;
-  if (!recording.error().empty()) throw InputError(recording.error());
-  result.recorded = recording.totals();
-  result.replayed.digest = digest.value(flight->system().map());
-  return result;
+  result_.difference = std::move(comparison_.first());
+  if (result_.difference) {
+    result_.difference->minor_frame = result_.replayed.minor_frames;
+    result_.difference->time_s = result_.seconds;
+  }
+  result_.damage = recording_.damage();
+  const bool compares_all =
+      recording_.kind() == RecordKind::kEnd && recording_.is_whole() && !result_.difference;
+  if (compares_all) result_.replayed.digest = digest_.value(flight_.system().map());
+  result_.recorded = compares_all ? recording_.totals() : result_.replayed;
+  return std::move(result_);
+}
+
+}  // namespace
+
+ReplayResult replay_flight(const std::string& path, const std::function<void(double)>& progress,
+                           double until_s) {
+  return std::make_unique<Replay>(path)->run(progress, until_s);
 }
 
 }  // namespace roborun::mission

@@ -1,62 +1,79 @@
-/// A recorded flight, flown again on its own inputs.
+/// A flight, flown again on the inputs in its log.
 #pragma once
 
 #include <cstdint>
 #include <functional>
-#include <span>
+#include <limits>
+#include <optional>
 #include <string>
-#include <vector>
+#include <string_view>
 
-#include "platform/input/input_file.hpp"
+#include "platform/log/mcap_reader.hpp"
+#include "platform/mission/inputs_format.hpp"
 #include "platform/mission/recorded_flight.hpp"
 #include "platform/mission/recording.hpp"
 
 namespace roborun::mission {
 
-/// Reads a recording, record by record. Whatever is wrong with the file becomes one line.
+/// Reads the inputs in a log, record by record. Whatever is wrong with the file becomes one line.
 class Recording {
  public:
-  /// Reads the configuration. Throws InputError.
+  /// Reads the configuration. Throws InputError, also for a log that holds no inputs.
   explicit Recording(const std::string& path);
 
   [[nodiscard]] const RecordedFlight& flight() const noexcept { return flight_; }
   [[nodiscard]] RecordKind kind() const noexcept { return kind_; }
-  [[nodiscard]] std::span<const std::byte> payload() const noexcept { return payload_; }
-  /// On to the next record. At the end and in a broken file nothing follows: kind() is kEnd.
-  void next() noexcept;
-  /// Empty, or what is wrong with the file and where.
-  [[nodiscard]] const std::string& error() const noexcept { return error_; }
-  /// Of the recorded flight. Only at the end.
-  [[nodiscard]] FlightTotals totals() const noexcept;
+  [[nodiscard]] std::string_view payload() const noexcept { return payload_; }
+  /// On to the next record. At the end and where the file is cut or damaged nothing follows: kind() is kEnd.
+  void next();
+  /// The whole log was read, and it is whole. Only at the end.
+  [[nodiscard]] bool is_whole() const noexcept { return damage_.empty(); }
+  /// Empty, or what is wrong with the file, and where.
+  [[nodiscard]] const std::string& damage() const noexcept { return damage_; }
+  /// Of the flight. Only at the end of a whole log.
+  [[nodiscard]] FlightTotals totals() const noexcept { return totals_; }
 
  private:
-  void read_record() noexcept;
-  /// Throws InputError if the file cannot be read.
-  void try_to_read_record();
+  /// The configuration, once it has come.
+  [[nodiscard]] bool read_configuration(const log::Message& message);
+  void read_message();
   void break_off(const std::string& why);
+  void end();
 
   std::string path_;
-  input::InputFile file_;
-  std::uint64_t position_{0};
-  std::uint64_t checksum_{0};
-  RecordKind kind_{};
-  std::vector<std::byte> payload_;
-  std::string error_;
+  log::McapReader reader_;
+  std::uint32_t sequence_{0};  ///< Of the next message of inputs.
+  InputRecords inputs_;
+  std::size_t at_{0};  ///< The next one of them.
+  RecordKind kind_{RecordKind::kGiveUp};
+  std::string_view payload_;
+  FlightTotals totals_;
+  std::string damage_;
   RecordedFlight flight_;
 };
 
-struct ReplayResult {
-  FlightTotals recorded, replayed;
-  double seconds{};  ///< Of the flight.
-  /// Of the replayed flight: the minor frame in which it first wanted other inputs than the recorded one.
-  std::uint64_t diverged_in{};
-  [[nodiscard]] bool same() const noexcept { return diverged_in == 0 && recorded == replayed; }
+/// Where a replay first does something else than the flight did.
+struct ReplayDifference {
+  std::uint64_t minor_frame{};  ///< From 1.
+  double time_s{};
+  std::string stage;  ///< "inputs", "track", or one of a decision.
+  std::string what;   ///< "motor 2", "p0_level", ...
+  std::string recorded, replayed;
 };
 
-/// Flies on recorded inputs alone, through the same executive, programs and stages. Throws InputError
-/// for a file that is no recording, is cut off or was changed. `progress` (may be empty) gets the seconds
-/// done, once a second of flight.
-[[nodiscard]] ReplayResult replay_flight(const std::string& path,
-                                         const std::function<void(double)>& progress);
+struct ReplayResult {
+  FlightTotals recorded;  ///< Of a whole log that was replayed to its end; else as `replayed`.
+  FlightTotals replayed;
+  double seconds{};    ///< Replayed.
+  std::string damage;  ///< Empty, or where the log ends early: it was replayed so far.
+  std::optional<ReplayDifference> difference;
+  [[nodiscard]] bool same() const noexcept { return !difference && recorded == replayed; }
+};
+
+/// Flies on recorded inputs alone, through the same executive, programs and stages, and compares every motor command and
+/// decision; of a whole log the map in the end, too. Throws InputError for a file that is no log, or has no inputs. `until_s`: no
+/// minor frame after it. `progress` (may be empty) gets the seconds done, once a second of flight.
+[[nodiscard]] ReplayResult replay_flight(const std::string& path, const std::function<void(double)>& progress,
+                                         double until_s = std::numeric_limits<double>::infinity());
 
 }  // namespace roborun::mission

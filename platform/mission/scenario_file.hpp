@@ -2,6 +2,7 @@
 /// come of it.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,7 +14,7 @@ namespace roborun::mission {
 /// What must come of the flight. What is not there is not asked for; a collision, or the true position
 /// outside the fence, fails every scenario that does not name it as its outcome.
 struct Expectation {
-  std::string outcome;                         ///< The reason why the mission ended.
+  std::string outcome;  ///< The reason why the mission ended; empty: any safe one (kSafeOutcomes).
   std::optional<std::string> action;           ///< The last one of the failsafe; "go_on": none was taken.
   std::optional<std::string> condition;        ///< Held when an action was decided.
   std::optional<double> within_s;              ///< From the first fault to the first action.
@@ -23,6 +24,10 @@ struct Expectation {
   std::optional<double> home_within_m;         ///< Where it ends, over ground.
   std::optional<bool> landing_site_known;
 };
+
+/// Ends that the failsafe table has for something that is broken, and arrival.
+inline constexpr std::array<const char*, 5> kSafeOutcomes{"reached_goal", "landed", "holding", "terminated",
+                                                          "killed"};
 
 struct Scenario {
   std::string name;   ///< The file's name without folder and ending.
@@ -42,10 +47,12 @@ struct Scenario {
 /// for_s; [[goal]] position_m, at_s: goals in the place of those not answered yet, those of one instant in order; [[body]] as in a world file (body_reader.hpp); [expect] with the fields above. Throws
 /// InputError with file, line, key and what would be right.
 [[nodiscard]] Scenario load_scenario(const std::string& path);
+/// Whether a TOML file has a table that only scenarios have ([scenario], [expect], [[fault]]). Throws InputError for what
+/// cannot be read and for what is no TOML.
+[[nodiscard]] bool is_scenario(const std::string& path);
+/// Where it is flown, bodies included. Throws InputError for a file that is no world.
+[[nodiscard]] sitl::World world_of(const Scenario& scenario);
 /// Flies it. Throws InputError for a world that cannot be flown.
 [[nodiscard]] report::MissionReport fly_scenario(const Scenario& scenario);
-/// What was not as expected, one line each; empty: passed.
-[[nodiscard]] std::vector<std::string> complaints_of(const Scenario& scenario,
-                                                     const report::MissionReport& report);
 
 }  // namespace roborun::mission

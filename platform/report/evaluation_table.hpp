@@ -17,7 +17,7 @@ namespace roborun::report {
 /// beside the published one. Where the sweep has no such missions the row says which environments are missing.
 [[nodiscard]] std::string sensitivity_table(const std::vector<SweepRow>& rows, const std::string& profile);
 
-/// Flights of one environment and profile, several seeds a design: time, velocity, energy, latency, and what
+/// Flights of one environment and profile, several seeds per design: time, velocity, energy, latency, and what
 /// the decisions in zones A, B and C took: mean by stage, and the longest; for environment 14 beside what was
 /// published. The borders are x in metres;
 /// empty: one zone.

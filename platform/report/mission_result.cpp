@@ -39,6 +39,8 @@ std::string to_json(const MissionResult& r) {
   json["mission"] = r.mission;
   json["reason"] = r.reason;
   json["speed_limit_mps"] = r.speed_limit_mps;
+  if (r.route)
+    json["mission"] = {{"steps", r.route->steps}, {"done", r.route->done}, {"released", r.route->released}};
   for (const GoalRecord& g : r.goals)
     json["goals"].push_back({{"goal_m", {g.goal_W.x(), g.goal_W.y(), g.goal_W.z()}},
                              {"answer", g.answer},

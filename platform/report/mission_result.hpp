@@ -67,9 +67,15 @@ struct MissionResult {
   std::string planner;
   std::string ways;
   std::string mission;
-  std::string reason;             ///< Why the mission ended.
-  double speed_limit_mps{};       ///< v_max of the design.
-  bool believed{true};            ///< False: a plugin took more time than the work that it counted is worth.
+  std::string reason;        ///< Why the mission ended.
+  double speed_limit_mps{};  ///< v_max of the design.
+  bool believed{true};       ///< False: a plugin took more time than the work that it counted is worth.
+  /// Of a plan; another key, or none.
+  struct RouteRecord {
+    std::size_t steps{}, done{};
+    std::uint64_t released{};  ///< Packages.
+  };
+  std::optional<RouteRecord> route;
   std::vector<GoalRecord> goals;  ///< One more key, or none: a mission with the world's goal alone.
   /// By sensor, then reason; in JSON {"camera 1": {"fog": 3}}.
   std::vector<RefusedRecord> refused;
@@ -146,7 +152,10 @@ struct SafetyRecord {
   double first_fault_s{-1.0};  ///< -1: none.
   double last_thrust_s{};      ///< When a motor was last given more than zero.
   double touchdown_mps{};      ///< Of the last time it came down.
-  bool left_fence{};
+  double touchdown_s{-1.0};    ///< When; -1: it did not.
+  double left_fence_s{-1.0};   ///< When it first was outside the fence; -1: never.
+  Vector3 left_fence_W = Vector3::Zero();
+  std::string end;  ///< What the judge saw when it ended the mission, in one sentence; or empty.
   bool landing_site_was_known{};
   Vector3 end_W = Vector3::Zero();
   double goal_error_m{};  ///< From there to the goal.
@@ -169,7 +178,8 @@ struct MissionReport {
   std::vector<PoolUse> pools;
   std::vector<WorkRecord> work;
   SafetyRecord safety;
-  KnownSlice known;  ///< Empty unless it was asked for.
+  KnownSlice known;       ///< Empty unless it was asked for.
+  std::string log_error;  ///< Empty, or one line: what is missing in the flight's log.
 };
 
 /// What missions are compared by.

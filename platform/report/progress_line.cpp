@@ -9,8 +9,11 @@ namespace roborun::report {
 
 ProgressLine::ProgressLine() : terminal_(isatty(STDERR_FILENO) != 0), start_(Clock::now()), last_(start_) {}
 
-ProgressLine::~ProgressLine() {
+ProgressLine::~ProgressLine() { clear(); }
+
+void ProgressLine::clear() {
   if (terminal_ && shown_) fmt::print(stderr, "\r{:90}\r", "");
+  shown_ = false;
 }
 
 bool ProgressLine::due() const {

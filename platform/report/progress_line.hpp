@@ -17,6 +17,8 @@ class ProgressLine {
   [[nodiscard]] bool due() const;
   /// Writes the line to standard error.
   void show(const std::string& text);
+  /// Takes the line off the terminal before something else is printed there.
+  void clear();
   /// Wall time since this was made.
   [[nodiscard]] double elapsed_s() const;
 

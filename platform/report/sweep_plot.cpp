@@ -283,7 +283,7 @@ std::string overall_svg(const std::vector<SweepRow>& rows) {
        {"energy, kJ", [](const DesignSummary& s) { return s.energy_kJ; },
         [](const Published& p) { return p.energy_kJ; }},
        {"median latency, s", [](const DesignSummary& s) { return s.latency_s; }, nullptr},
-       {"CPU time a decision, s", [](const DesignSummary& s) { return s.cpu_s_per_decision; }, nullptr}}};
+       {"CPU time per decision, s", [](const DesignSummary& s) { return s.cpu_s_per_decision; }, nullptr}}};
   Svg svg;
   std::vector<std::string> names;
   names.reserve(summaries.size());

@@ -11,7 +11,7 @@
 
 namespace roborun::report {
 
-/// Velocity, mission time, energy, latency and CPU time a decision: a bar a design and profile, whiskers: 95
+/// Velocity, mission time, energy, latency and CPU time per decision: one bar per design and profile, whiskers: 95
 /// % interval over seeds, dashes: what RoboRun printed.
 [[nodiscard]] std::string overall_svg(const std::vector<SweepRow>& rows);
 

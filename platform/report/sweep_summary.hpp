@@ -44,7 +44,7 @@ struct DesignSummary {
 };
 
 /// How many times as good one is as another, over the missions (environment, seed) that both reached: faster,
-/// shorter, with less energy, latency and CPU time a decision. Intervals: each seed gives one ratio.
+/// shorter, with less energy, latency and CPU time per decision. Intervals: each seed gives one ratio.
 struct Gain {
   int pairs{};
   Estimate velocity, mission_time, energy, latency, cpu_s_per_decision;
@@ -79,7 +79,7 @@ struct Published {
 [[nodiscard]] std::string gain_head();
 [[nodiscard]] std::string gain_row(const std::string& what, const Gain& gain);
 
-/// The table that a person reads at the end of `roborun sweep`: a row a design, published values below,
+/// The table that a person reads at the end of `roborun sweep`: one row per design, published values below,
 /// gains, and every mission that did not reach the goal. Plain ASCII, at most 110 columns.
 [[nodiscard]] std::string sweep_table(const std::vector<SweepRow>& rows);
 /// One JSON object on one line; `designs` holds the designs of the first profile, `profiles` those of all.

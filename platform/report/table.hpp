@@ -8,7 +8,7 @@
 
 namespace roborun::report {
 
-/// One row a design, at most 110 columns, plain ASCII. Ratios are against the row of the design "static", if
+/// One row per design, at most 110 columns, plain ASCII. Ratios are against the row of the design "static", if
 /// there is one and it reached the goal.
 [[nodiscard]] std::string comparison_table(std::span<const MissionResult> results);
 

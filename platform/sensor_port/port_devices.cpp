@@ -8,13 +8,6 @@
 namespace roborun::sensor_port {
 namespace {
 
-template <typename Sample>
-Sample sample_of(const PortSample& port) noexcept {
-  Sample sample;
-  std::memcpy(&sample, port.sample.data(), sizeof sample);
-  return sample;
-}
-
 template <typename... Numbers>
 bool are_finite(Numbers... x) noexcept {
   return (std::isfinite(x) && ...);
@@ -119,7 +112,15 @@ std::optional<MonotonicTime> PortDevice::stamp_of(const PortSample& port, std::i
   const auto sum = static_cast<std::uint64_t>(stamp_ns) + static_cast<std::uint64_t>(port.clock_offset_ns) -
                    static_cast<std::uint64_t>(clock_.epoch.count());
   const MonotonicTime stamp{Nanos{static_cast<std::int64_t>(sum)}};
-  const bool forward = stamp > last_;
+  const bool is_first = last_ == MonotonicTime::min();
+  const bool forward = stamp > last_ || (may_repeat_ && stamp == last_);
+  // Forward, and so below 2^64. What was overwritten between two samples that are read was no silence.
+  const auto apart = static_cast<std::uint64_t>(stamp.time_since_epoch().count()) -
+                     static_cast<std::uint64_t>(last_.time_since_epoch().count());
+  const std::uint64_t between = reader_.counters().dropped - dropped_before_;
+  dropped_before_ = reader_.counters().dropped;
+  if (forward && !is_first && apart / (between + 1) > static_cast<std::uint64_t>(patience_.count()))
+    ++silences_;
   last_ = stamp;
   if (forward) return stamp;
   ++refusals_.backwards;
@@ -144,8 +145,8 @@ std::string PortDepthCamera::open(const std::string& path, const PortClock& cloc
 Status PortDepthCamera::read(firmware_if::DepthFrame& frame) noexcept {
   PortSample port;
   if (const Status status = reader_.newest(port); status != Status::kOk) return status;
-  const auto d = sample_of<roborun_port_depth>(port);
-  const auto stamp = stamp_of(port, d.at.stamp_ns);
+  roborun_port_depth d;
+  const auto stamp = take(port, d);
   if (!stamp) return Status::kNotReady;
   if (!is_size(d, port.payload.size()) || std::size_t{d.width} * d.height > depth_m_.size()) {
     ++refusals_.size;
@@ -184,8 +185,8 @@ std::string PortLidar::open(const std::string& path, const PortClock& clock) {
 Status PortLidar::read(firmware_if::LidarSweep& sweep) noexcept {
   PortSample port;
   if (const Status status = reader_.newest(port); status != Status::kOk) return status;
-  const auto c = sample_of<roborun_port_cloud>(port);
-  const auto stamp = stamp_of(port, c.at.stamp_ns);
+  roborun_port_cloud c;
+  const auto stamp = take(port, c);
   if (!stamp) return Status::kNotReady;
   if (c.points > points_L_m_.size() || port.payload.size() != c.points * sizeof(roborun_port_point)) {
     ++refusals_.size;
@@ -214,8 +215,8 @@ std::string PortImu::open(const std::string& path, const PortClock& clock) {
 Status PortImu::read(firmware_if::ImuSample& sample) noexcept {
   PortSample port;
   if (const Status status = reader_.next(port); status != Status::kOk) return status;
-  const auto s = sample_of<roborun_port_imu>(port);
-  const auto stamp = stamp_of(port, s.at.stamp_ns);
+  roborun_port_imu s;
+  const auto stamp = take(port, s);
   if (!stamp) return Status::kNotReady;
   if (!all_finite(s.angular_rate_B_radps) || !all_finite(s.specific_force_B_mps2)) {
     ++refusals_.values;
@@ -235,8 +236,8 @@ std::string PortOdometry::open(const std::string& path, const PortClock& clock) 
 Status PortOdometry::read(firmware_if::OdometrySample& sample) noexcept {
   PortSample port;
   if (const Status status = reader_.next(port); status != Status::kOk) return status;
-  const auto s = sample_of<roborun_port_odometry>(port);
-  const auto stamp = stamp_of(port, s.at.stamp_ns);
+  roborun_port_odometry s;
+  const auto stamp = take(port, s);
   if (!stamp) return Status::kNotReady;
   const auto is_variance = [](float x) { return std::isfinite(x) && x >= 0.0F; };
   if (!all_finite(s.p_OB_m) || !all_finite(s.v_OB_mps) || !is_rotation(s.q_OB) ||

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,11 +39,25 @@ class PortDevice {
   [[nodiscard]] PortReader& reader() noexcept { return reader_; }
   [[nodiscard]] const PortReader& reader() const noexcept { return reader_; }
   [[nodiscard]] const PortRefusals& refusals() const noexcept { return refusals_; }
+  /// A silence that lasts longer is counted. Before the first read.
+  void set_patience(Nanos patience) noexcept { patience_ = patience; }
+  /// Silences between two samples, and the one since the newest if it is as long at `now`.
+  [[nodiscard]] std::uint64_t silences(MonotonicTime now) const noexcept {
+    return silences_ + (last_ != MonotonicTime::min() && now - last_ > patience_ ? 1 : 0);
+  }
+  /// Of the newest sample whose stamp was read; the least there is before the first.
+  [[nodiscard]] MonotonicTime newest() const noexcept { return last_; }
 
  protected:
   ~PortDevice() = default;
-  /// Of the run's clock, or nothing: it went back.
-  [[nodiscard]] std::optional<MonotonicTime> stamp_of(const PortSample& port, std::int64_t stamp_ns) noexcept;
+  /// The sample and its stamp on the run's clock, or nothing: the clock went back.
+  template <typename Sample>
+  [[nodiscard]] std::optional<MonotonicTime> take(const PortSample& port, Sample& sample) noexcept {
+    std::memcpy(&sample, port.sample.data(), sizeof sample);
+    return stamp_of(port, sample.at.stamp_ns);
+  }
+  /// Samples of this device may share an instant.
+  void allow_equal_stamps() noexcept { may_repeat_ = true; }
 
   [[nodiscard]] bool has_mount(const roborun_port_mount& mount) noexcept;
 
@@ -51,8 +66,14 @@ class PortDevice {
   firmware_if::CameraMount mount_{};
 
  private:
+  [[nodiscard]] std::optional<MonotonicTime> stamp_of(const PortSample& port, std::int64_t stamp_ns) noexcept;
+
   bool is_mounted_{false};
+  bool may_repeat_{false};
   PortClock clock_{};
+  Nanos patience_{500'000'000};
+  std::uint64_t silences_{0};
+  std::uint64_t dropped_before_{0};
   MonotonicTime last_ = MonotonicTime::min();
 };
 

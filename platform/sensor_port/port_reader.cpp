@@ -13,6 +13,8 @@ static_assert(sizeof(roborun_port_header) == 128 && sizeof(roborun_port_slot) ==
 static_assert(sizeof(roborun_port_depth) == 96 && sizeof(roborun_port_cloud) == 64);
 static_assert(sizeof(roborun_port_odometry) == 144 && sizeof(roborun_port_imu) == 64);
 static_assert(sizeof(roborun_port_gnss) == 88 && sizeof(roborun_port_range) == 64);
+static_assert(sizeof(roborun_port_pressure) == 32 && sizeof(roborun_port_can) == 32);
+static_assert(sizeof(roborun_port_lines) == 24);
 
 template <typename T>
 T load(const T& shared, int order) noexcept {
@@ -36,6 +38,12 @@ const char* kind_name(std::uint32_t kind) noexcept {
       return "gnss";
     case ROBORUN_PORT_RANGE:
       return "range";
+    case ROBORUN_PORT_PRESSURE:
+      return "pressure";
+    case ROBORUN_PORT_CAN:
+      return "can";
+    case ROBORUN_PORT_LINES:
+      return "lines";
     default:
       return "unknown";
   }
@@ -50,7 +58,7 @@ std::string PortReader::check_layout() {
   if (h.version != ROBORUN_PORT_VERSION)
     return fmt::format("is of port version {}: must be {}", h.version, ROBORUN_PORT_VERSION);
   const std::uint32_t sample_bytes = roborun_port_sample_bytes(h.kind);
-  if (sample_bytes == 0) return fmt::format("holds samples of kind {}: must be 1 to 6", h.kind);
+  if (sample_bytes == 0) return fmt::format("holds samples of kind {}: must be 1 to 9", h.kind);
   if (kind_ != 0 && h.kind != kind_)
     return fmt::format("holds {} samples: must be {}", kind_name(h.kind), kind_name(kind_));
   if (h.sample_bytes != sample_bytes)

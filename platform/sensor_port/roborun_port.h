@@ -44,7 +44,10 @@ enum roborun_port_kind {
   ROBORUN_PORT_ODOMETRY = 3,
   ROBORUN_PORT_IMU = 4,
   ROBORUN_PORT_GNSS = 5,
-  ROBORUN_PORT_RANGE = 6
+  ROBORUN_PORT_RANGE = 6,
+  ROBORUN_PORT_PRESSURE = 7,
+  ROBORUN_PORT_CAN = 8,
+  ROBORUN_PORT_LINES = 9
 };
 
 struct roborun_port_header {
@@ -146,6 +149,35 @@ struct roborun_port_range {
   uint32_t reserved;
 };
 
+/* Static pressure outside of the vehicle. */
+struct roborun_port_pressure {
+  struct roborun_port_stamp at;
+  double pressure_Pa;
+  float temperature_K; /* NaN: not known */
+  uint32_t reserved;
+};
+
+/* A frame of a CAN bus with 29-bit identifiers: one port holds what a node hears, another one what it sends. */
+struct roborun_port_can {
+  struct roborun_port_stamp at; /* end of the frame on the bus; sent: when its content was made */
+  uint32_t id;                  /* 29 bits */
+  uint32_t size;                /* 0 .. 8 */
+  uint8_t data[8];
+};
+
+enum roborun_port_line {
+  ROBORUN_PORT_KILL_OPEN = 1,   /* normally open contact of the kill switch: active once it is pressed */
+  ROBORUN_PORT_KILL_CLOSED = 2, /* normally closed contact: active until it is pressed */
+  ROBORUN_PORT_OPERATOR = 4     /* active: the operator is heard */
+};
+
+/* Levels of lines, again and again: a line that nobody writes is one that is gone. */
+struct roborun_port_lines {
+  struct roborun_port_stamp at;
+  uint32_t wired;  /* sum of enum roborun_port_line: what there is */
+  uint32_t active; /* of those */
+};
+
 /* Bytes of a sample of this kind; 0: no such kind. */
 static inline uint32_t roborun_port_sample_bytes(uint32_t kind) {
   switch (kind) {
@@ -155,6 +187,9 @@ static inline uint32_t roborun_port_sample_bytes(uint32_t kind) {
     case ROBORUN_PORT_IMU: return (uint32_t)sizeof(struct roborun_port_imu);
     case ROBORUN_PORT_GNSS: return (uint32_t)sizeof(struct roborun_port_gnss);
     case ROBORUN_PORT_RANGE: return (uint32_t)sizeof(struct roborun_port_range);
+    case ROBORUN_PORT_PRESSURE: return (uint32_t)sizeof(struct roborun_port_pressure);
+    case ROBORUN_PORT_CAN: return (uint32_t)sizeof(struct roborun_port_can);
+    case ROBORUN_PORT_LINES: return (uint32_t)sizeof(struct roborun_port_lines);
     default: return 0;
   }
 }

@@ -361,12 +361,57 @@ bool Estimator::place_coarsely(const firmware_if::GnssFix& fix, const Vector3& d
   return correct_by(fix, Vector3::Zero(), dv_mps, yaw_rad) && verdict != FrameShift::Verdict::kRefused;
 }
 
+void Estimator::move_frame(const EstimatedState& next, bool hold) noexcept {
+  constexpr double kTurned_rad = 0.035;
+  const double gap_s = seconds(next.stamp - state_.stamp);
+  const Quaternion expected = state_.q_WB * small_rotation(gap_s * state_.w_WB_B);
+  const double turned_rad = core::wrap_angle(core::yaw_of(next.q_WB) - core::yaw_of(expected));
+  const Vector3 expected_W = state_.p_WB + gap_s * state_.v_WB;
+  followed_shift_W_ = hold ? Vector3(next.p_WB - expected_W) : Vector3::Zero();
+  if (!hold || gap_s > seconds(kOldestState) || !(std::fabs(turned_rad) < kTurned_rad)) ++map_number_;
+  ++counters_.jumps;
+}
+
+Status Estimator::follow(const firmware_if::AutopilotState& sample, MonotonicTime now,
+                         bool hold_frame) noexcept {
+  const Nanos age = now - sample.stamp;
+  if (age < Nanos{0} || age > kOldestState || (started_ && now <= state_.stamp)) {
+    ++counters_.refused_stamp;
+    return Status::kStale;
+  }
+  const Vector3 p_WB = to_vector(sample.p_WB_m);
+  const Vector3 v_WB = to_vector(sample.v_WB_mps);
+  const Vector3 w_WB_B = to_vector(sample.w_WB_B_radps);
+  const Quaternion q_WB(sample.q_WB[0], sample.q_WB[1], sample.q_WB[2], sample.q_WB[3]);
+  if (!is_finite(p_WB) || !is_finite(v_WB) || !is_finite(w_WB_B) || !q_WB.coeffs().allFinite() ||
+      !(std::fabs(q_WB.squaredNorm() - 1.0) < 0.02)) {
+    ++counters_.refused_not_finite;
+    return Status::kInvalidArgument;
+  }
+  const double dt_s = seconds(age);
+  EstimatedState next = state_;
+  next.stamp = now;
+  next.p_WB = p_WB + dt_s * v_WB;
+  next.v_WB = v_WB;
+  next.q_WB = (q_WB * small_rotation(dt_s * w_WB_B)).normalized();
+  next.w_WB_B = w_WB_B;
+  if (!started_)
+    begin_filter();
+  else if (sample.frame_number != followed_frame_)
+    move_frame(next, hold_frame);
+  followed_frame_ = sample.frame_number;
+  next.p_WB -= followed_shift_W_;
+  state_ = next;
+  past_.add({state_.stamp, state_.p_WB, state_.v_WB, state_.q_WB});
+  return Status::kOk;
+}
+
 Status Estimator::state(EstimatedState& out) const noexcept {
   if (!started_) return Status::kNotReady;
   out = state_;
   out.map_sigma_m = position_sigma_m();
   out.map_sigma_rad = std::sqrt(std::fmax(P_(6, 6), std::fmax(P_(7, 7), P_(8, 8))));
-  out.shift_W = shift_.shift_W();
+  out.shift_W = shift_.shift_W() + followed_shift_W_;
   out.drift_ratio = anchor_ ? config_.drift_ratio : 0.0;
   const bool is_shifted = anchor_ || shift_.sigma_m() > kMapLost_m;
   out.position_sigma_m = is_shifted ? core::hypot2(out.map_sigma_m, shift_.sigma_m()) : out.map_sigma_m;

@@ -8,6 +8,7 @@
 
 #include "core/geometry/vector.hpp"
 #include "firmware_if/assert.hpp"
+#include "firmware_if/autopilot.hpp"
 #include "firmware_if/barometer.hpp"
 #include "firmware_if/gnss.hpp"
 #include "firmware_if/imu.hpp"
@@ -102,6 +103,15 @@ class Estimator {
   /// kOk: believed. kNotReady: not yet, see above. RT-safe: O(1).
   [[nodiscard]] Status update(const firmware_if::OdometrySample& sample) noexcept;
 
+  /// The state of an autopilot's estimator in the place of this one, carried on to `now` with its velocity and rates: for
+  /// vehicles without sensors of their own; not mixed with the calls above. kStale: older than kOldestState, or the time
+  /// does not rise; nothing changes. Where its frame jumps (frame_number), ours goes on, shift_W tells the difference, and
+  /// map_number changes if the jump turned it, too, or nobody knows what was flown meanwhile. Without `hold_frame`, for a vehicle
+  /// that stands, ours jumps with it. RT-safe: O(1).
+  static constexpr Nanos kOldestState{200'000'000};
+  [[nodiscard]] Status follow(const firmware_if::AutopilotState& sample, MonotonicTime now,
+                              bool hold_frame) noexcept;
+
   /// kNotReady before the start.
   [[nodiscard]] Status state(EstimatedState& out) const noexcept;
   /// As estimated then: a late fix corrects the present only.
@@ -131,6 +141,8 @@ class Estimator {
   void start(const firmware_if::OdometrySample& sample, const OdometryState& in_O) noexcept;
   /// At rest in every respect but the state, which is there.
   void begin_filter() noexcept;
+  /// The autopilot's frame jumped: `next` is what it says now.
+  void move_frame(const EstimatedState& next, bool hold) noexcept;
   [[nodiscard]] bool follows_odometry(MonotonicTime at) const noexcept {
     return anchor_ && at - last_odometry_ <= kOdometryLost;
   }
@@ -178,6 +190,8 @@ class Estimator {
   bool fixes_agreed_{false};       ///< Since the start: only then one that differs is a jump.
   double barometer_shift_m_{0.0};  ///< Its altitude less the height, while odometry holds that.
   std::uint32_t map_number_{0};
+  std::uint32_t followed_frame_{0};
+  Vector3 followed_shift_W_ = Vector3::Zero();  ///< From our frame to the autopilot's.
 };
 
 }  // namespace roborun::stages

@@ -77,9 +77,15 @@ constexpr bool ages_as_its_cells() noexcept {
 static_assert(ages_as_its_cells<false, false>() && ages_as_its_cells<false, true>() &&
               ages_as_its_cells<true, false>() && ages_as_its_cells<true, true>());
 
+/// True if a cell changed.
 template <bool kInPart, bool kOfTheThin>
-void miss(BrickWords& word, int level, std::uint32_t parent, std::uint8_t blocks) noexcept {
-  const auto age = [](Word& w, Word selected) { w = after_miss<kInPart, kOfTheThin>(w, selected); };
+bool miss(BrickWords& word, int level, std::uint32_t parent, std::uint8_t blocks) noexcept {
+  Word changed = 0;
+  const auto age = [&changed](Word& w, Word selected) {
+    const Word aged = after_miss<kInPart, kOfTheThin>(w, selected);
+    changed |= w ^ aged;
+    w = aged;
+  };
   if (level == 0) {
     age(word[parent / 2], Word{kSpreadBits[blocks]} << (32U * (parent % 2)));
   } else if (level == 1) {
@@ -96,6 +102,7 @@ void miss(BrickWords& word, int level, std::uint32_t parent, std::uint8_t blocks
       for (std::size_t k = 0; k < count; ++k) age(first[k], kAll);
     }
   }
+  return changed != 0;
 }
 
 }  // namespace
@@ -145,22 +152,57 @@ void Brick::read(CellBlock& cells) const noexcept {
   }
 }
 
+void Brick::read_doubled(std::size_t eighth, CellBlock& cells) const noexcept {
+  static_assert(content::kOccupied == 2);
+  constexpr Word kBytes = 0x0101010101010101ULL;
+  constexpr std::size_t kHalf = kBlockCells / 2;
+  // The lowest bits of eight bytes as one byte.
+  const auto gather = [](Word bits) { return static_cast<unsigned>(bits * 0x0102040810204080ULL >> 56U); };
+  const std::size_t at = kBlockCells * kHalf * (eighth >> 2U) + kHalf * (eighth >> 1U & 1U);
+  if (mip.back() == content::kFree) {
+    const unsigned row = (eighth & 1U) != 0 ? 0xFF00U : 0xFFU;
+    for (std::size_t i = 0; i < 64; ++i) {
+      std::uint16_t& to = cells.free[at + kBlockCells * (i / kHalf) + i % kHalf];
+      to = static_cast<std::uint16_t>(to | row);
+    }
+    return;
+  }
+  for (std::size_t i = 0; i < 64; ++i) {  // of level 2: eight of level 1
+    Word flags = 0;
+    std::memcpy(&flags, mip.data() + 8 * i, sizeof flags);
+    const Word other = flags ^ (kBytes * content::kFree);
+    const unsigned free = gather(~(other | other >> 1U | other >> 2U) & kBytes);
+    const unsigned occupied = gather(flags >> 1U & kBytes);
+    if ((free | occupied) == 0) continue;
+    const auto [first_row, cx] = kPlaceOfWord[4 * i];
+    const unsigned shift = cx / 2U + ((eighth & 1U) != 0 ? 8U : 0U);
+    for (std::size_t pair = 0; pair < 4; ++pair) {
+      const std::size_t row = at + first_row / 2U + kBlockCells * (pair / 2) + pair % 2;
+      cells.free[row] = static_cast<std::uint16_t>(cells.free[row] | (free >> (2U * pair) & 3U) << shift);
+      cells.occupied[row] =
+          static_cast<std::uint16_t>(cells.occupied[row] | (occupied >> (2U * pair) & 3U) << shift);
+    }
+  }
+}
+
 void Brick::set_cell(std::uint32_t morton, unsigned value) noexcept {
   const unsigned shift = 4U * (morton % kCellsPerWord);
   Word& w = word[morton / kCellsPerWord];
+  const Word before = w;
   w = (w & ~(Word{0xF} << shift)) | (Word{value} << shift);
-  stale = true;
+  stale = stale || w != before;
 }
 
 void Brick::add_free(int level, std::uint32_t parent, std::uint8_t blocks, evidence::Past past) noexcept {
-  stale = true;
+  bool changed = false;
   if (past.of_the_thin) {
-    past.in_part ? miss<true, true>(word, level, parent, blocks)
-                 : miss<false, true>(word, level, parent, blocks);
+    changed = past.in_part ? miss<true, true>(word, level, parent, blocks)
+                           : miss<false, true>(word, level, parent, blocks);
   } else {
-    past.in_part ? miss<true, false>(word, level, parent, blocks)
-                 : miss<false, false>(word, level, parent, blocks);
+    changed = past.in_part ? miss<true, false>(word, level, parent, blocks)
+                           : miss<false, false>(word, level, parent, blocks);
   }
+  stale = stale || changed;
 }
 
 }  // namespace roborun::stages

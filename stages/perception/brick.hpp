@@ -15,6 +15,7 @@ struct Brick {
   std::array<std::uint8_t, 512 + 64 + 8 + 1> mip{};  ///< Levels 1 to 4, derived by refresh().
   bool dirty{};                                      ///< Written to in this scan.
   bool stale{};                                      ///< Cells changed since refresh().
+  std::uint64_t revision{};                          ///< BrickMap's number of what the cells are now.
   std::uint16_t known_count{};                       ///< Cells that are not unknown.
   std::int32_t x{}, y{}, z{};                        ///< Position in bricks from the map's corner.
   std::int32_t cleared{};                            ///< BrickMap's mark of the last scan that saw past it.
@@ -29,6 +30,8 @@ struct Brick {
   void set_cell(std::uint32_t morton, unsigned value) noexcept;
   /// All cells as bits. O(4096).
   void read(CellBlock& cells) const noexcept;
+  /// The same in cells twice as large, into one of the eight halves of a block. After refresh().
+  void read_doubled(std::size_t eighth, CellBlock& cells) const noexcept;
   /// Flags of the cell of `level` (0 .. 4) with this Morton index. After refresh(). O(1).
   [[nodiscard]] inline std::uint8_t flags(int level, std::uint32_t morton) const noexcept;
   /// Free evidence for the blocks of `level` with Morton index 8 * parent + i, for each bit i of `blocks`.

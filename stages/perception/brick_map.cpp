@@ -155,6 +155,7 @@ Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexce
     fresh.z = bz;
     fresh.dirty = false;
     fresh.cleared = 0;
+    fresh.revision = ++revision_;
     known_count_[static_cast<std::size_t>(slot)] = fresh.known_count;
   }
   Brick& brick = brick_[static_cast<std::size_t>(slot)];
@@ -256,6 +257,7 @@ void BrickMap::refresh(Brick& brick) noexcept {
   if (!brick.stale) return;
   known_cells_ -= brick.known_count;
   brick.refresh();
+  brick.revision = ++revision_;
   known_cells_ += brick.known_count;
   known_count_[static_cast<std::size_t>(&brick - brick_.data())] = brick.known_count;
 }

@@ -81,6 +81,7 @@ class BrickMap final : public OccupancyMap, private MapView {
  private:
   struct Cell {
     std::int32_t x, y, z;
+    [[nodiscard]] bool operator==(const Cell&) const noexcept = default;
   };
   static constexpr double kOrderStep_m =
       0.5;  ///< Units whose distances differ by less keep their order in space.
@@ -115,6 +116,11 @@ class BrickMap final : public OccupancyMap, private MapView {
   [[nodiscard]] double finest_m() const noexcept override { return config_.lattice.finest_m; }
   [[nodiscard]] BlockContent read(const Vector3& corner_W, double cell_m, CellBlock& cells,
                                   std::uint64_t& lookups) const noexcept override;
+  [[nodiscard]] BlockContent read_doubled(const Vector3& corner_W, CellBlock& cells,
+                                          std::uint64_t& lookups) const noexcept override;
+  [[nodiscard]] std::uint64_t revision(const Vector3& corner_W) const noexcept override;
+  /// The block with this corner.
+  [[nodiscard]] const Brick* brick_above(const Vector3& corner_W) const noexcept;
 
   /// The frame with what its holes say.
   [[nodiscard]] firmware_if::DepthFrame with_reach(const PosedDepthFrame& posed) noexcept;
@@ -146,6 +152,9 @@ class BrickMap final : public OccupancyMap, private MapView {
                                 core::StageBudget& budget, core::Work& work) noexcept;
   [[nodiscard]] bool clear_block(const Position& block, std::uint8_t cameras, int finest,
                                  core::StageBudget& budget, core::Work& work) noexcept;
+  /// Of a brick and p0. What is no wider there than a pixel is not divided: smaller cells tell nothing more, and are eight times as
+  /// many.
+  [[nodiscard]] int finest_at(const Vector3& center_W, int finest) const noexcept;
   void clear_brick(const Position& at, std::uint8_t cameras, int finest, core::Work& work) noexcept;
   void free_unit(const Position& unit) noexcept;
   void free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept;
@@ -202,6 +211,18 @@ class BrickMap final : public OccupancyMap, private MapView {
   /// No deeper than to cells of `level`; bricks farther than `radius_m` from view_center_W_ are unknown.
   [[nodiscard]] bool box_free(const Aabb& box_W, int level, double radius_m,
                               std::uint64_t& lookups) const noexcept;
+  /// Bricks, the last ones included.
+  struct Box {
+    Cell low, high;
+    [[nodiscard]] bool operator==(const Box&) const noexcept = default;
+  };
+  static constexpr std::size_t kDistances = 512;
+  static constexpr double kDistance_m = 2.4;
+  using KnownByDistance = std::array<std::uint64_t, kDistances>;  ///< Cells.
+  /// Adds what is known in `box`, but not in `done`, which lies in it. Counts the positions on. False: budget spent.
+  [[nodiscard]] bool count_known(const Box& box, const Box& done, std::size_t& positions,
+                                 KnownByDistance& known, core::StageBudget& budget,
+                                 core::Work& work) const noexcept;
   [[nodiscard]] const Brick* brick_within(std::int32_t bx, std::int32_t by, std::int32_t bz,
                                           double radius_m) const noexcept;
   /// nullptr where nothing is known.
@@ -241,6 +262,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   PixelRow pixels_{};
   SurfaceRow row_{};
   TileRow tiles_{};
+  std::uint64_t revision_{0};
   double reach_m_{0.0};    ///< From the trajectory: v0 was spent up to here.
   Brick free_brick_{};     ///< What every free position reads as.
   Brick surface_brick_{};  ///< The same for kSurfaceBrick.
@@ -251,6 +273,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   Vector3 vehicle_W_ = Vector3::Zero();
   std::uint32_t thin_seen_{0};  ///< Pixels of this scan that showed something thin.
   double thin_reach_m_{0.0};    ///< Of this scan: counts_for_the_thin().
+  double least_pitch_{};        ///< Of the finest pixels of this scan, at depth 1.
   int view_level_{0};
   double view_radius_m_{0.0};  ///< Bricks whose centre is farther from view_center_W_ are unknown.
   Vector3 view_center_W_ = Vector3::Zero();

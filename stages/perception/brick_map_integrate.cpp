@@ -209,9 +209,15 @@ std::size_t BrickMap::order_units(const IntegrationRequest& request) noexcept {
   return total;
 }
 
+int BrickMap::finest_at(const Vector3& center_W, int finest) const noexcept {
+  const double near_m = (center_W - vehicle_W_).norm() - brick_m();
+  while (finest + 1 < kBrickLevel && size_m(finest + 1) <= least_pitch_ * near_m) ++finest;
+  return finest;
+}
+
 void BrickMap::clear_brick(const Position& at, std::uint8_t cameras, int finest, core::Work& work) noexcept {
   const Vector3 center_W = brick_center_W(at.x, at.y, at.z);
-  see_brick(cameras_, {center_W, kBrickLevel, cameras}, finest, seen_);
+  see_brick(cameras_, {center_W, kBrickLevel, cameras}, finest_at(center_W, finest), seen_);
   work.units += seen_.visited;
   work.volume_m3 += seen_.free_cells * volume_m3(center_W, brick_m()) / kCellsPerBrick;
   if (seen_.count == 0 || slot_[slot_of(at.x, at.y, at.z)] <= kFreeBrick) return;
@@ -268,10 +274,17 @@ std::size_t BrickMap::clear_units(std::size_t count, const IntegrationRequest& r
     work.units += (here + 7) / 8;
     for (std::size_t i = 0; i < here; ++i) {
       const Position& unit = unit_of[i];
-      if (((seen.free >> i) & 1U) != 0) {
+      bool is_free = ((seen.free >> i) & 1U) != 0;
+      const bool is_mixed = !is_free && ((seen.mixed >> i) & 1U) != 0;
+      // Near blocks make a look at many at once a rough one. What is not divided is looked at once more, alone.
+      if (is_mixed && finest >= unit_level_) {
+        is_free = (see_blocks(cameras_, unit_level_, std::span(center_W).subspan(i, 1)).free & 1U) != 0;
+        ++work.units;
+      }
+      if (is_free) {
         free_unit(unit);
         work.volume_m3 += volume_m3(center_W[i], size_m(unit_level_));
-      } else if (((seen.mixed >> i) & 1U) != 0 && finest < unit_level_) {
+      } else if (is_mixed && finest < unit_level_) {
         if (!clear_unit(unit, seen.cameras[i], finest, budget, work))
           return first + i + 1;  // what was cleared in it needs its surfaces
       }
@@ -302,9 +315,13 @@ Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget&
   free_now_ = kFreeBrick - 1 - static_cast<std::int32_t>(counters_.scans % kFreeStamps);
   vehicle_W_ = cameras_.camera[0].p_WC - request.frames[frame_of_[0]].p_BC_W;
   double pitch = 0.0;
-  for (std::size_t i = 0; i < cameras_.count; ++i)
-    pitch = std::max({pitch, 1.0 / static_cast<double>(cameras_.camera[i].columns_per_tan),
-                      1.0 / static_cast<double>(cameras_.camera[i].rows_per_tan)});
+  least_pitch_ = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < cameras_.count; ++i) {
+    const double across = 1.0 / static_cast<double>(cameras_.camera[i].columns_per_tan);
+    const double along = 1.0 / static_cast<double>(cameras_.camera[i].rows_per_tan);
+    pitch = std::max({pitch, across, along});
+    least_pitch_ = std::min({least_pitch_, across, along});
+  }
   thin_reach_m_ = std::ldexp(config_.thinnest_m / (kThinPatience * pitch),
                              std::countr_zero(counters_.scans | std::uint64_t{1} << 20U));
   const std::size_t count = order_units(request);

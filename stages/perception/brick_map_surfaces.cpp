@@ -201,7 +201,9 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work)
   for (std::size_t i = 0; i < cameras_.count; ++i) {
     SurfaceCamera camera;
     camera.posed = &request.frames[frame_of_[i]];
-    camera.level = request.level;
+    // A surface that is only noted leaves its whole block unknown: no look at cells of less than 4.8 m does that.
+    const bool notes = size_m(request.level) >= block_m(kPublishedCell_m);
+    camera.level = notes ? request.level : std::min(request.level, kBrickLevel - 1);
     const firmware_if::DepthFrame& frame = camera.posed->frame;
     camera.column_pitch = 2.0 * static_cast<double>(frame.tan_half_width) / frame.width;
     camera.row_pitch = 2.0 * static_cast<double>(frame.tan_half_height) / frame.height;

@@ -6,6 +6,32 @@
 
 namespace roborun::stages {
 
+bool BrickMap::count_known(const Box& box, const Box& done, std::size_t& positions, KnownByDistance& known,
+                           core::StageBudget& budget, core::Work& work) const noexcept {
+  for (std::int32_t bz = box.low.z; bz <= box.high.z; ++bz) {
+    for (std::int32_t by = box.low.y; by <= box.high.y; ++by) {
+      const std::int32_t* const row = &slot_[slot_of(0, by, bz)];
+      const bool crosses = bz >= done.low.z && bz <= done.high.z && by >= done.low.y && by <= done.high.y;
+      for (std::int32_t bx = box.low.x; bx <= box.high.x; ++bx) {
+        if (crosses && bx == done.low.x) {
+          bx = done.high.x;
+          continue;
+        }
+        if (++positions % 1024 == 0 && budget.spent(work)) return false;
+        const std::int32_t slot = row[bx];
+        if (slot == kUnknownBrick || slot == kSurfaceBrick) continue;
+        const std::size_t count =
+            slot <= kFreeBrick ? kCellsPerBrick : known_count_[static_cast<std::size_t>(slot)];
+        if (count == 0) continue;
+        ++work.units;
+        const double distance_m = (brick_center_W(bx, by, bz) - view_center_W_).norm();
+        known[std::min(static_cast<std::size_t>(distance_m / kDistance_m), kDistances - 1)] += count;
+      }
+    }
+  }
+  return true;
+}
+
 Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& budget,
                              core::Work& work) noexcept {
   work = {};
@@ -14,40 +40,46 @@ Status BrickMap::export_view(const ExportRequest& request, core::StageBudget& bu
   view_level_ = work.level;
   view_center_W_ = request.center_W;
 
-  // Histogram of known space over distance; the view ends with the last bucket that fits.
-  constexpr std::size_t kBuckets = 512;
-  constexpr double kBucket_m = 2.4;
-  std::array<std::uint64_t, kBuckets> known{};
-  std::size_t position = 0;
-  for (std::int32_t bz = 0; bz < nz_; ++bz) {
-    for (std::int32_t by = 0; by < ny_; ++by) {
-      for (std::int32_t bx = 0; bx < nx_; ++bx, ++position) {
-        // Too late to know what fits: the radius of the view before stays, around the new centre. What is
-        // known is as true as ever, v1 only saves the planner work.
-        if (position % 1024 == 1023 && budget.spent(work)) return Status::kBudgetSpent;
-        const std::int32_t slot = slot_[position];
-        const std::size_t count = slot <= kFreeBrick ? kCellsPerBrick
-                                  : slot >= 0        ? known_count_[static_cast<std::size_t>(slot)]
-                                                     : 0;
-        if (count == 0) continue;
-        ++work.units;
-        const double distance_m = (brick_center_W(bx, by, bz) - view_center_W_).norm();
-        known[std::min(static_cast<std::size_t>(distance_m / kBucket_m), kBuckets - 1)] += count;
+  // Histogram of known space over distance; the view ends with the last bucket that fits. What is counted is in a box around the
+  // centre, which grows until the end is in it. It begins around a ball of v1: no view ends within that.
+  KnownByDistance known{};
+  const Vector3 centre = (view_center_W_ - corner_W_) / brick_m();
+  const Box all{{0, 0, 0}, {nx_ - 1, ny_ - 1, nz_ - 1}};
+  Box done{{0, 0, 0}, {-1, -1, -1}};
+  constexpr double kBall = 4.18, kGrowth = 1.25, kMost_m = 1e5;
+  double half_m = 2.0 * kDistance_m;
+  std::size_t positions = 0;
+  while (kBall * half_m * half_m * half_m < request.volume_m3 && half_m < kMost_m) half_m *= kGrowth;
+  for (;; half_m *= kGrowth) {
+    const double half = half_m / brick_m();
+    const auto low = [half](double c, std::int32_t n) {
+      return static_cast<std::int32_t>(std::clamp(std::floor(c - half), 0.0, n - 1.0));
+    };
+    const auto high = [half](double c, std::int32_t n) {
+      return static_cast<std::int32_t>(std::clamp(std::floor(c + half), 0.0, n - 1.0));
+    };
+    const Box box{{low(centre.x(), nx_), low(centre.y(), ny_), low(centre.z(), nz_)},
+                  {high(centre.x(), nx_), high(centre.y(), ny_), high(centre.z(), nz_)}};
+    // Too late to know what fits: the radius of the view before stays, around the new centre. What is
+    // known is as true as ever, v1 only saves the planner work.
+    if (!count_known(box, done, positions, known, budget, work)) return Status::kBudgetSpent;
+    done = box;
+    const bool is_all = box == all;
+    const std::size_t counted =
+        is_all ? kDistances : std::min(static_cast<std::size_t>(half_m / kDistance_m), kDistances - 1);
+    work.volume_m3 = 0.0;
+    for (std::size_t i = 0; i < counted; ++i) {
+      const double volume_m3 = static_cast<double>(known[i]) * finest_m3();
+      if (work.volume_m3 + volume_m3 > request.volume_m3 && i > 1) {
+        view_radius_m_ = static_cast<double>(i) * kDistance_m;
+        return Status::kBudgetSpent;
       }
+      work.volume_m3 += volume_m3;
     }
+    if (!is_all) continue;
+    view_radius_m_ = std::numeric_limits<double>::infinity();
+    return Status::kOk;
   }
-  Status status = Status::kOk;
-  view_radius_m_ = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < kBuckets; ++i) {
-    const double volume_m3 = static_cast<double>(known[i]) * finest_m3();
-    if (work.volume_m3 + volume_m3 > request.volume_m3 && i > 1) {
-      view_radius_m_ = static_cast<double>(i) * kBucket_m;
-      status = Status::kBudgetSpent;
-      break;
-    }
-    work.volume_m3 += volume_m3;
-  }
-  return status;
 }
 
 const Brick* BrickMap::brick_within(std::int32_t bx, std::int32_t by, std::int32_t bz,
@@ -118,20 +150,49 @@ BlockContent BrickMap::read(const Vector3& corner_W, double cell_m, CellBlock& c
   static_assert(kBlockCells == kBrickCells);
   if (cell_m != finest_m()) return read_cell_by_cell(*this, corner_W, cell_m, cells, lookups);
   ++lookups;
-  Cell corner{};
-  if (!is_finite(corner_W)) return BlockContent::kUnknown;
-  const Vector3 middle_W = corner_W + Vector3::Constant(0.5 * brick_m());
-  const Vector3 local = (middle_W - corner_W_) / brick_m();
-  corner = {static_cast<std::int32_t>(std::floor(local.x())),
-            static_cast<std::int32_t>(std::floor(local.y())),
-            static_cast<std::int32_t>(std::floor(local.z()))};
-  const Brick* brick = brick_within(corner.x, corner.y, corner.z, std::numeric_limits<double>::infinity());
+  const Brick* brick = brick_above(corner_W);
   if (brick == nullptr) return BlockContent::kUnknown;
   if (brick->flags(kBrickLevel, 0) == content::kFree) return BlockContent::kFree;
   if (brick == &surface_brick_) return BlockContent::kUnknown;
   lookups += brick->word.size();
   brick->read(cells);
   return BlockContent::kMixed;
+}
+
+BlockContent BrickMap::read_doubled(const Vector3& corner_W, CellBlock& cells,
+                                    std::uint64_t& lookups) const noexcept {
+  constexpr std::uint64_t kWorkOfAMip = 256;  // its 64 words take half as long as the 512 of the cells
+  std::size_t free = 0, unknown = 0;
+  cells = {};
+  for (std::size_t eighth = 0; eighth < 8; ++eighth) {
+    ++lookups;
+    const Brick* brick = brick_above(corner_W + brick_m() * corner_of_eighth(eighth));
+    if (brick == nullptr || brick == &surface_brick_) {
+      ++unknown;
+      continue;
+    }
+    free += brick->flags(kBrickLevel, 0) == content::kFree ? 1U : 0U;
+    lookups += brick == &free_brick_ ? 0 : kWorkOfAMip;
+    brick->read_doubled(eighth, cells);
+  }
+  if (free == 8) return BlockContent::kFree;
+  return unknown == 8 ? BlockContent::kUnknown : BlockContent::kMixed;
+}
+
+const Brick* BrickMap::brick_above(const Vector3& corner_W) const noexcept {
+  if (!is_finite(corner_W)) return nullptr;
+  const Vector3 middle_W = corner_W + Vector3::Constant(0.5 * brick_m());
+  const Vector3 local = (middle_W - corner_W_) / brick_m();
+  return brick_within(
+      static_cast<std::int32_t>(std::floor(local.x())), static_cast<std::int32_t>(std::floor(local.y())),
+      static_cast<std::int32_t>(std::floor(local.z())), std::numeric_limits<double>::infinity());
+}
+
+std::uint64_t BrickMap::revision(const Vector3& corner_W) const noexcept {
+  constexpr std::uint64_t kUnknownOne = 1, kFreeOne = 2, kFirst = 3;
+  const Brick* brick = brick_above(corner_W);
+  if (brick == nullptr || brick == &surface_brick_) return kUnknownOne;
+  return brick == &free_brick_ ? kFreeOne : kFirst + brick->revision;
 }
 
 CellState BrickMap::at(const Vector3& p_W, std::uint64_t& lookups) const noexcept {

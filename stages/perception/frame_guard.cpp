@@ -13,13 +13,28 @@ namespace {
 constexpr std::size_t kSamples = 64;
 constexpr std::size_t kLeastSurfaces = 8;
 
-/// Of the samples of an image; 0 if too few of them show a surface.
-std::uint64_t print_of(const firmware_if::DepthFrame& frame) noexcept {
+/// From the sensor to the outer corner of a pixel, in units of its depth.
+float longest_ray(const firmware_if::DepthFrame& f, std::size_t pixel) noexcept {
+  const auto aside = [](std::size_t at, std::size_t pixels) {
+    const auto middle = static_cast<float>(pixels) * 0.5F, begin = static_cast<float>(at);
+    return std::max(std::fabs(begin - middle), std::fabs(begin + 1.0F - middle)) / middle;
+  };
+  const float left = aside(pixel % f.width, f.width) * f.tan_half_width;
+  const float up = aside(pixel / f.width, f.height) * f.tan_half_height;
+  return std::sqrt(1.0F + left * left + up * up);
+}
+
+/// Of the samples of an image; 0 if too few of them show a surface. Rays of a cloud that met nothing end at its range, all
+/// in the same way.
+std::uint64_t print_of(const PosedDepthFrame& posed) noexcept {
+  const firmware_if::DepthFrame& frame = posed.frame;
   std::uint64_t hash = 1;
   std::size_t surfaces = 0;
   for (std::size_t i = 0; i < kSamples; ++i) {
-    const float depth_m = frame.depth_m[(2 * i + 1) * frame.depth_m.size() / (2 * kSamples)];
-    surfaces += depth_m > frame.range_min_m && depth_m < frame.range_m ? 1U : 0U;
+    const std::size_t pixel = (2 * i + 1) * frame.depth_m.size() / (2 * kSamples);
+    const float depth_m = frame.depth_m[pixel];
+    const float reach_m = posed.is_cloud ? frame.range_m / longest_ray(frame, pixel) : frame.range_m;
+    surfaces += depth_m > frame.range_min_m && depth_m < reach_m ? 1U : 0U;
     hash = core::mix64(hash ^ std::bit_cast<std::uint32_t>(depth_m));
   }
   return surfaces < kLeastSurfaces ? 0 : hash;
@@ -88,8 +103,9 @@ void FrameGuard::begin(std::span<const PosedDepthFrame> scan) noexcept {
   scan_ = middle;
 }
 
-bool FrameGuard::frozen(const firmware_if::DepthFrame& frame) noexcept {
-  const std::uint64_t hash = print_of(frame);
+bool FrameGuard::frozen(const PosedDepthFrame& posed) noexcept {
+  const firmware_if::DepthFrame& frame = posed.frame;
+  const std::uint64_t hash = print_of(posed);
   if (hash == 0) return false;
   for (Print& print : print_) {
     if (print.hash != hash) continue;
@@ -123,7 +139,7 @@ FrameFault FrameGuard::judge_content(const PosedDepthFrame& posed) noexcept {
   const double informed = informed_ratio(posed);
   if (informed < kLeastInformedRatio)
     return informed < kCoveredRatio ? FrameFault::kCovered : FrameFault::kFog;
-  return has_noise && frozen(posed.frame) ? FrameFault::kFrozen : FrameFault::kNone;
+  return has_noise && frozen(posed) ? FrameFault::kFrozen : FrameFault::kNone;
 }
 
 }  // namespace roborun::stages

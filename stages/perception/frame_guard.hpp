@@ -67,7 +67,7 @@ class FrameGuard {
     MonotonicTime stamp{};
   };
   [[nodiscard]] FrameFault judge_content(const PosedDepthFrame& posed) noexcept;
-  [[nodiscard]] bool frozen(const firmware_if::DepthFrame& frame) noexcept;
+  [[nodiscard]] bool frozen(const PosedDepthFrame& posed) noexcept;
 
   std::array<Print, 32> print_{};
   std::size_t next_{0};

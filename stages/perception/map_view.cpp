@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/random/counter_rng.hpp"
+
 namespace roborun::stages {
 namespace {
 
@@ -65,17 +67,20 @@ void merge_eighth(const CellBlock& fine, std::size_t eighth, CellBlock& cells) n
 
 }  // namespace
 
-BlockContent read_blocks(const MapView& view, const Vector3& corner_W, double cell_m, CellBlock& cells,
-                         std::uint64_t& lookups) noexcept {
-  if (cell_m != 2.0 * view.finest_m()) return view.read(corner_W, cell_m, cells, lookups);
+Vector3 corner_of_eighth(std::size_t eighth) noexcept {
+  return {static_cast<double>(eighth & 1U), static_cast<double>(eighth >> 1U & 1U),
+          static_cast<double>(eighth >> 2U & 1U)};
+}
+
+BlockContent read_eighths(const MapView& view, const Vector3& corner_W, CellBlock& cells,
+                          std::uint64_t& lookups) noexcept {
   cells = {};
   std::size_t free = 0, unknown = 0;
   CellBlock fine;
+  const double finest_m = view.finest_m();
   for (std::size_t eighth = 0; eighth < 8; ++eighth) {
-    const Vector3 offset((eighth & 1U) != 0 ? 1.0 : 0.0, (eighth & 2U) != 0 ? 1.0 : 0.0,
-                         (eighth & 4U) != 0 ? 1.0 : 0.0);
     const BlockContent content =
-        view.read(corner_W + block_m(0.5 * cell_m) * offset, 0.5 * cell_m, fine, lookups);
+        view.read(corner_W + block_m(finest_m) * corner_of_eighth(eighth), finest_m, fine, lookups);
     if (content == BlockContent::kUnknown) {
       ++unknown;
       continue;
@@ -89,6 +94,19 @@ BlockContent read_blocks(const MapView& view, const Vector3& corner_W, double ce
   }
   if (free == 8) return BlockContent::kFree;
   return unknown == 8 ? BlockContent::kUnknown : BlockContent::kMixed;
+}
+
+std::uint64_t blocks_revision(const MapView& view, const Vector3& corner_W, double cell_m,
+                              std::uint64_t& lookups) noexcept {
+  ++lookups;
+  if (cell_m != 2.0 * view.finest_m()) return view.revision(corner_W);
+  std::uint64_t all = 0;
+  for (std::size_t eighth = 0; eighth < 8; ++eighth) {
+    const std::uint64_t one = view.revision(corner_W + block_m(0.5 * cell_m) * corner_of_eighth(eighth));
+    if (one == 0) return 0;
+    all = core::mix64(all + one);
+  }
+  return all;
 }
 
 bool is_segment_free(const MapView& view, const Vector3& a_W, const Vector3& b_W, double radius_m,

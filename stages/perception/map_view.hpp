@@ -1,6 +1,7 @@
 /// What the planner, the smoother and the profilers may ask of a map.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "core/geometry/vector.hpp"
@@ -13,6 +14,10 @@ enum class CellState : std::uint8_t { kUnknown, kFree, kOccupied };
 class MapView;
 [[nodiscard]] BlockContent read_cell_by_cell(const MapView& view, const Vector3& corner_W, double cell_m,
                                              CellBlock& cells, std::uint64_t& lookups) noexcept;
+
+/// MapView::read_doubled() from eight blocks of the finest.
+[[nodiscard]] BlockContent read_eighths(const MapView& view, const Vector3& corner_W, CellBlock& cells,
+                                        std::uint64_t& lookups) noexcept;
 
 /// The map at precision p1 inside volume v1. Unknown is not free: whatever was not exported is unknown.
 /// Contract: no call blocks or allocates; all are const and give the same answer for the same map.
@@ -40,11 +45,29 @@ class MapView {
                                           std::uint64_t& lookups) const noexcept {
     return read_cell_by_cell(*this, corner_W, cell_m, cells, lookups);
   }
+  /// The same in cells of twice the map's finest: free if all eight in them are, occupied if one is.
+  [[nodiscard]] virtual BlockContent read_doubled(const Vector3& corner_W, CellBlock& cells,
+                                                  std::uint64_t& lookups) const noexcept {
+    return read_eighths(*this, corner_W, cells, lookups);
+  }
+  /// Of the block that read() tells at its finest: as long as this is the same, so are its cells. 0: not told. O(1).
+  [[nodiscard]] virtual std::uint64_t revision(const Vector3& corner_W) const noexcept {
+    (void)corner_W;
+    return 0;
+  }
 };
 
-/// The same in cells of finest_m() or of twice that: of those free if all eight in them are, occupied if one is.
-[[nodiscard]] BlockContent read_blocks(const MapView& view, const Vector3& corner_W, double cell_m,
-                                       CellBlock& cells, std::uint64_t& lookups) noexcept;
+/// read() in cells of finest_m() or of twice that.
+[[nodiscard]] inline BlockContent read_blocks(const MapView& view, const Vector3& corner_W, double cell_m,
+                                              CellBlock& cells, std::uint64_t& lookups) noexcept {
+  return cell_m == 2.0 * view.finest_m() ? view.read_doubled(corner_W, cells, lookups)
+                                         : view.read(corner_W, cell_m, cells, lookups);
+}
+/// Of the eight halves of a cube, in edges of a half.
+[[nodiscard]] Vector3 corner_of_eighth(std::size_t eighth) noexcept;
+/// revision() of what read_blocks() tells; 0: not told.
+[[nodiscard]] std::uint64_t blocks_revision(const MapView& view, const Vector3& corner_W, double cell_m,
+                                            std::uint64_t& lookups) noexcept;
 
 /// is_free_at_finest() of another view, which must outlive it, in the place of is_free().
 class FinestView final : public MapView {

@@ -99,8 +99,10 @@ void tell_pixels_lanes(const firmware_if::DepthFrame& frame, std::size_t v, std:
       return hn::And(hn::Not(hn::Or(hn::Le(a, high), hn::Le(b, high))), hn::Or(farther(a), farther(b)));
     };
     const auto doubtful = hn::And(mixes, hn::Or(lone, any(nearer)));
+    // What is beyond the range may be so by noise alone: where a plane ends at it, every other pixel would stand out.
+    const auto may_stand_out = hn::Lt(high, hn::Set(d, frame.range_m));
     const auto thin =
-        hn::AndNot(doubtful, hn::And(is_surface, hn::Or(stands_out(left, right), stands_out(up, down))));
+        hn::AndNot(doubtful, hn::And(may_stand_out, hn::Or(stands_out(left, right), stands_out(up, down))));
     const std::uint64_t bits = bits_of(thin);
     row.any_thin = row.any_thin || bits != 0;
     row.thin[u / 64] |= bits << (u % 64);

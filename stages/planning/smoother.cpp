@@ -4,23 +4,19 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
+
+#include "core/memory/static_vector.hpp"
+#include "stages/planning/curve.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr double kAtRest = 0.05;  // m/s and m/s2
+constexpr double kAtRest = 1e-6;  // m/s and m/s2
 constexpr double kSameWaypoint_m = 0.25;
 constexpr double kLeastPiece_m = 0.03;
-constexpr double kMinSegment_s = 0.15;
-constexpr double kCruisePiece_m = 5.0;
-// Of the acceleration limit: the curve around the profile needs the rest.
-constexpr double kProfileShare = 0.60;
-constexpr double kCornerCut_m = 0.3;  // how far a corner may be cut: the planner leaves about so much room
-constexpr double kLimitTolerance = 1.05;
-constexpr int kSamples = 12;  // per segment, for the limits
-constexpr int kStretchRounds = 10;
-constexpr int kSplitRounds = 6;
-constexpr int kSlowRounds = 4;
+constexpr double kPieceTime_s = 0.15;   // of a chord: at 4 m/s2 the curve leaves it by 1.1 cm
 constexpr double kMaxStart_mps = 50.0;  // a state that is faster is no state of this vehicle
 
 /// The speed limit along a way that climbs or descends: its vertical part keeps that limit, too.
@@ -29,45 +25,6 @@ double limit_along_mps(const Vector3& way, double length_m, const MotionLimits& 
   const double rise_m = std::fabs(way.z());
   return rise_m * limits.speed_mps > vertical_mps * length_m ? vertical_mps * length_m / rise_m
                                                              : limits.speed_mps;
-}
-
-/// Distance needed to change between two speeds: v1^2 = v0^2 + 2 a s.
-double change_m(double from_mps, double to_mps, double a_mps2) noexcept {
-  return std::fabs(to_mps * to_mps - from_mps * from_mps) / (2.0 * a_mps2);
-}
-
-/// The speed at which an arc that cuts the corner by kCornerCut_m needs no more than a_mps2 across. With h half
-/// the turn, an arc of radius r leaves the corner by r (1 / cos h - 1), and v^2 = a r; so
-///   v^2 = a cut cos h / (1 - cos h)
-/// Straight on: +infinity.
-double corner_speed_mps(const Vector3& before, const Vector3& after, double a_mps2) noexcept {
-  const double cosine = std::clamp(before.normalized().dot(after.normalized()), -1.0, 1.0);
-  const double half = std::sqrt(0.5 * (1.0 + cosine));  // cosine of half the turn
-  if (half > 0.9999) return std::numeric_limits<double>::infinity();
-  return std::sqrt(a_mps2 * kCornerCut_m * half / (1.0 - half));
-}
-
-/// The most of a segment: squares, whose roots are taken once.
-struct Motion {
-  double speed2{}, acceleration2{}, jerk2{};
-  double climb_mps{}, descent_mps{};
-};
-
-/// Raises what is most to what is at one instant.
-void add_motion(const PolynomialSegment& segment, double at_s, Motion& most) noexcept {
-  Vector3 v_W = Vector3::Zero();
-  Vector3 a_W = Vector3::Zero();
-  Vector3 half_j_W = Vector3::Zero();
-  for (std::size_t k = PolynomialSegment::kCoefficients; k-- > 1;) {
-    half_j_W = half_j_W * at_s + a_W;
-    a_W = a_W * at_s + v_W;
-    v_W = v_W * at_s + static_cast<double>(k) * segment.coefficient[k];
-  }
-  most.speed2 = std::max(most.speed2, v_W.squaredNorm());
-  most.acceleration2 = std::max(most.acceleration2, a_W.squaredNorm());
-  most.jerk2 = std::max(most.jerk2, 4.0 * half_j_W.squaredNorm());
-  most.climb_mps = std::max(most.climb_mps, v_W.z());
-  most.descent_mps = std::max(most.descent_mps, -v_W.z());
 }
 
 bool is_well_posed(const SmoothRequest& request) noexcept {
@@ -83,204 +40,119 @@ bool is_needed(const MapView& view, const SmoothRequest& request, const Vector3&
          !is_segment_free(view, before_W, request.path_W[i + 1], request.radius_m, lookups);
 }
 
-using Speeds = std::array<double, MinimumSnap::kMaxKnots>;
-
-/// Steps 1 and 2 of allocate(): the highest speed at each point of the path from which every later corner, and
-/// the stop at the end, can still be braked for: v_i^2 <= v_(i+1)^2 + 2 a length.
-void limit_speeds(std::span<const Vector3> path_W, const TrajectoryPoint& start, const MotionLimits& limits,
-                  double a_mps2, Speeds& speed_mps) noexcept {
-  const std::size_t n = path_W.size();
-  const Vector3 first = (path_W[1] - path_W[0]).normalized();
-  speed_mps[0] = std::max(start.v_W.dot(first), 0.0);
-  for (std::size_t i = 1; i + 1 < n; ++i) {
-    const Vector3 before = path_W[i] - path_W[i - 1];
-    const Vector3 after = path_W[i + 1] - path_W[i];
-    speed_mps[i] =
-        std::min({limit_along_mps(before, before.norm(), limits),
-                  limit_along_mps(after, after.norm(), limits), corner_speed_mps(before, after, a_mps2)});
-  }
-  speed_mps[n - 1] = 0.0;
-  for (std::size_t i = n - 1; i-- > 1;) {
-    const double length_m = (path_W[i + 1] - path_W[i]).norm();
-    speed_mps[i] =
-        std::min(speed_mps[i], std::sqrt(speed_mps[i + 1] * speed_mps[i + 1] + 2.0 * a_mps2 * length_m));
-  }
+Vector3 position_W(const PolynomialSegment& segment, double at_s) noexcept {
+  Vector3 p_W = Vector3::Zero();
+  for (std::size_t k = PolynomialSegment::kCoefficients; k-- > 0;) p_W = p_W * at_s + segment.coefficient[k];
+  return p_W;
 }
 
-}  // namespace
+/// What a turn may take of the room at its corner, one after the other; at last a stop.
+constexpr std::array<double, 5> kShares{1.0, 0.6, 0.3, 0.1, 0.0};
 
-/// The trapezoidal speed profile of one straight piece: up to a peak, cruise, down.
-struct Smoother::SpeedProfile {
-  double up_m, cruise_m, down_m;
-  double up_s, cruise_s, down_s;
+/// How the start state is left, one after the other: without the first corner (if it is near) or with it, and the share of
+/// the speed that the first change may lead to. 0: a stop.
+struct Departure {
+  bool skips;
+  double share;
+};
+constexpr std::array<Departure, 7> kDepartures{
+    {{true, 1.0}, {false, 1.0}, {false, 0.6}, {false, 0.3}, {true, 0.5}, {false, 0.0}, {true, 0.0}}};
 
-  /// Without a limit, up and down meet where (peak^2 - v0^2) / 2a + (peak^2 - v1^2) / 2a = length, that is
-  /// at peak^2 = a length + (v0^2 + v1^2) / 2. Times are distances over mean speeds.
-  SpeedProfile(double length_m, double v0, double v1, double limit_mps, double a_mps2) noexcept {
-    const double peak = std::max(
-        {std::min(limit_mps, std::sqrt(std::max(a_mps2 * length_m + 0.5 * (v0 * v0 + v1 * v1), 0.0))), v1,
-         0.05});
-    up_m = std::min(change_m(v0, peak, a_mps2), length_m);
-    down_m = std::min(change_m(peak, v1, a_mps2), length_m - up_m);
-    cruise_m = std::max(length_m - up_m - down_m, 0.0);
-    up_s = 2.0 * up_m / (v0 + peak);
-    cruise_s = cruise_m / peak;
-    down_s = 2.0 * down_m / (peak + v1);
+/// How the path is flown, and what is tried next.
+class Tries {
+ public:
+  Tries(std::span<const Vector3> path_W, const TrajectoryPoint& start, const MotionLimits& limits) noexcept
+      : path_W_(path_W),
+        moves_(start.v_W.norm() > kAtRest || start.a_W.norm() > kAtRest),
+        last_(path_W.size()) {
+    const double stop_m = change_m(start.v_W.norm(), 0.0, {limits.acceleration_mps2, limits.jerk_mps3});
+    if (last_ < 3 || (path_W[1] - path_W[0]).norm() > stop_m) departure_ = 1;
   }
+
+  [[nodiscard]] Course course() const noexcept {
+    Course course;
+    const std::size_t skipped = skips() ? 1 : 0;
+    for (std::size_t i = 0; i + skipped < last_; ++i) {
+      (void)course.point_W.push_back(path_W_[i == 0 ? 0 : i + skipped]);
+      course.share[i] = kShares[tighter_[i == 0 ? 0 : i + skipped]];
+    }
+    course.start_share = moves_ ? kDepartures[departure_].share : 1.0;
+    return course;
+  }
+  /// After a course of which this part is not free. False: that was all.
+  [[nodiscard]] bool next_after(std::size_t part) noexcept {
+    const std::size_t i = part / 2 + (skips() ? 1 : 0);
+    // Straight pieces are the path's own: no other turn makes them free.
+    if (part == 0 || part % 2 == 1 || tighter_[i] + 1 == kShares.size()) return leave_otherwise(false);
+    ++tighter_[i];
+    return true;
+  }
+  /// `too_fast`: no speed leads from the start state to the first corner.
+  [[nodiscard]] bool leave_otherwise(bool too_fast) noexcept {
+    if (!moves_) return false;
+    left_otherwise_ = true;
+    const Departure before = kDepartures[departure_];
+    do {
+      if (++departure_ == kDepartures.size()) return false;
+    } while (
+        (kDepartures[departure_].skips && last_ < 3) ||
+        (too_fast && kDepartures[departure_].share > 0.0 && kDepartures[departure_].skips == before.skips));
+    return true;
+  }
+  /// Since it was asked last.
+  [[nodiscard]] bool has_left_otherwise() noexcept { return std::exchange(left_otherwise_, false); }
+  /// False: there is only one piece left.
+  [[nodiscard]] bool shorten() noexcept { return --last_ >= (skips() ? 3U : 2U); }
+
+ private:
+  [[nodiscard]] bool skips() const noexcept { return moves_ && kDepartures[departure_].skips; }
+
+  std::span<const Vector3> path_W_;
+  bool moves_, left_otherwise_{false};
+  std::size_t last_;  ///< Points that are flown.
+  std::size_t departure_{0};
+  std::array<std::size_t, Smoother::kMaxPoints> tighter_{};  ///< By point: index into kShares.
 };
 
-bool Smoother::Plan::add(const Vector3& p_W, double duration_s) noexcept {
-  if (count == kMaxKnots) return false;
-  knot_W[count] = p_W;
-  time_s[count++] = std::max(duration_s, kMinSegment_s);
-  return true;
-}
+/// The chords of a segment that keep free, from `first_s` of it on. `at_s`: where one does not.
+bool is_rest_free(const MapView& view, const PolynomialSegment& segment, double first_s, double radius_m,
+                  std::uint64_t& lookups, double& at_s) noexcept;
 
-/// Step 4 of allocate(): knots where the speed profile bends, if the pieces are long enough to be worth one.
-bool Smoother::Plan::add_piece(const Vector3& from_W, const Vector3& to_W, const SpeedProfile& p,
-                               bool last) noexcept {
-  const Vector3 way = to_W - from_W;
-  const double length_m = way.norm();
-  double pending_s = p.up_s;  // since the last knot
-  if (p.up_m > 1.5 && p.cruise_m + p.down_m > 1.5) {
-    if (!add(from_W + way * (p.up_m / length_m), p.up_s)) return false;
-    pending_s = 0.0;
-    // Long cruises are held by way-points: a single polynomial would sag between its ends.
-    const int pieces = std::min(static_cast<int>(p.cruise_m / kCruisePiece_m), 6);
-    for (int k = 1; k <= pieces; ++k) {
-      const double share = static_cast<double>(k) / (pieces + 1);
-      if (!add(from_W + way * ((p.up_m + share * p.cruise_m) / length_m), p.cruise_s / (pieces + 1)))
-        return false;
+/// Remembers which parts of the curve before were free: from one to the next, most are the same.
+class CheckedParts {
+ public:
+  /// The first part that is not free, or none.
+  [[nodiscard]] std::optional<std::size_t> find_blocked(const MapView& view, const Trajectory& trajectory,
+                                                        const SegmentParts& part, double radius_m,
+                                                        std::uint64_t& lookups) noexcept {
+    std::size_t end = 0;
+    for (std::size_t first = 0; first < trajectory.segment_count; first = end) {
+      for (end = first; end < trajectory.segment_count && part[end] == part[first];) ++end;
+      const Vector3& begin_W = trajectory.segment[first].coefficient[0];
+      const PolynomialSegment& last = trajectory.segment[end - 1];
+      const Ends ends{begin_W, position_W(last, last.duration_s), true};
+      Ends& before = free_[part[first]];
+      if (before.known && before.begin_W == ends.begin_W && before.end_W == ends.end_W) continue;
+      before.known = false;
+      double at_s = 0.0;
+      for (std::size_t k = first; k < end; ++k)
+        if (!is_rest_free(view, trajectory.segment[k], 0.0, radius_m, lookups, at_s)) return part[first];
+      before = ends;
     }
-    pending_s += p.cruise_s / (pieces + 1);
-  } else {
-    pending_s += p.cruise_s;
+    return std::nullopt;
   }
-  // Where braking begins. The final braking is worth a knot sooner: the tail is flown when a decision is late.
-  if (p.down_m > (last ? 0.3 : 1.5) && p.cruise_m + p.up_m > 1.0 && pending_s > kMinSegment_s &&
-      (p.cruise_m > 0.3 || pending_s > p.cruise_s)) {
-    if (!add(from_W + way * ((p.up_m + p.cruise_m) / length_m), pending_s)) return false;
-    pending_s = 0.0;
-  }
-  if (last) brake_knot = count - 1;
-  return add(to_W, pending_s + p.down_s);
-}
+  /// Points have other numbers now.
+  void forget() noexcept { free_ = {}; }
 
-/// Times for the path under the limits:
-///  1. the speed at each corner,
-///  2. backwards: no faster than what can be braked to the next point's speed,
-///  3. forwards: no faster than what can be reached from the point before,
-///  4. between them a trapezoidal profile, with knots where it bends.
-bool Smoother::allocate(std::span<const Vector3> path_W, const TrajectoryPoint& start,
-                        const MotionLimits& limits, Plan& plan) noexcept {
-  const std::size_t n = path_W.size();
-  const double a_mps2 = kProfileShare * limits.acceleration_mps2;
-  Speeds speed_mps{};
-  limit_speeds(path_W, start, limits, a_mps2, speed_mps);
-  plan.count = 0;
-  if (!plan.add(path_W[0], 0.0)) return false;
-  for (std::size_t i = 0; i + 1 < n; ++i) {
-    const double length_m = (path_W[i + 1] - path_W[i]).norm();
-    const double v0 = speed_mps[i];
-    speed_mps[i + 1] = std::min(speed_mps[i + 1], std::sqrt(v0 * v0 + 2.0 * a_mps2 * length_m));
-    const double limit_mps = limit_along_mps(path_W[i + 1] - path_W[i], length_m, limits);
-    const SpeedProfile profile(length_m, v0, speed_mps[i + 1], limit_mps, a_mps2);
-    if (!plan.add_piece(path_W[i], path_W[i + 1], profile, i + 2 == n)) return false;
-  }
-  return true;
-}
+ private:
+  struct Ends {
+    Vector3 begin_W = Vector3::Zero(), end_W = Vector3::Zero();
+    bool known{};
+  };
+  std::array<Ends, 2 * Smoother::kMaxPoints> free_{};
+};
 
-bool Smoother::solve(const Plan& plan, const TrajectoryPoint& start, Trajectory& out) const noexcept {
-  if (!minimum_snap_.solve({plan.knot_W.data(), plan.count}, {plan.time_s.data(), plan.count}, start, out))
-    return false;
-  out.brake_begin_s = 0.0;
-  for (std::size_t k = 0; k < plan.brake_knot; ++k) out.brake_begin_s += plan.time_s[k + 1];
-  return true;
-}
-
-bool Smoother::stretch_to_limits(const Task& task, const MotionLimits& limits, Plan& plan,
-                                 Trajectory& out) const noexcept {
-  const SmoothRequest& request = task.request;
-  const double speed_limit = std::max(limits.speed_mps * kLimitTolerance, request.start.v_W.norm() + 0.01);
-  const double acceleration_limit =
-      std::max(limits.acceleration_mps2 * kLimitTolerance, request.start.a_W.norm() + 0.01);
-  const double climb_limit = std::max(limits.climb_mps * kLimitTolerance, request.start.v_W.z() + 0.01);
-  const double descent_limit = std::max(limits.descent_mps * kLimitTolerance, 0.01 - request.start.v_W.z());
-  const double jerk_limit = std::max(limits.jerk_mps3 * kLimitTolerance, request.start.j_W.norm() + 0.01);
-  for (int round = 0; round < kStretchRounds && !task.budget.spent(task.work); ++round) {
-    if (!solve(plan, request.start, out)) return false;
-    bool fine = true;
-    for (std::size_t k = 0; k < out.segment_count; ++k) {
-      Motion most;
-      for (int i = 0; i <= kSamples; ++i)
-        add_motion(out.segment[k], out.segment[k].duration_s * i / kSamples, most);
-      // A time that is k times as long divides speed by k, acceleration by k^2 and jerk by k^3. The cube root
-      // of the jerk's excess is near enough to its power 3/8, which square roots can make.
-      const double jerk_root = std::sqrt(std::sqrt(std::sqrt(std::sqrt(most.jerk2) / jerk_limit)));
-      const double worst = std::max({1.0, std::sqrt(most.speed2) / speed_limit,
-                                     std::sqrt(std::sqrt(most.acceleration2) / acceleration_limit),
-                                     jerk_root * jerk_root * jerk_root, most.climb_mps / climb_limit,
-                                     most.descent_mps / descent_limit});
-      if (worst > 1.0) {
-        fine = false;
-        plan.time_s[k + 1] *= std::min(1.0 + 1.1 * (worst - 1.0) + 0.02, 1.5);
-      }
-    }
-    if (fine) return true;
-  }
-  return false;
-}
-
-bool Smoother::split(const Plan& plan, std::size_t segment, Path& path_W) noexcept {
-  const Vector3 middle_W = 0.5 * (plan.knot_W[segment] + plan.knot_W[segment + 1]);
-  std::size_t piece = 0;
-  double nearest_m = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i + 1 < path_W.size(); ++i) {
-    const Vector3 way = path_W[i + 1] - path_W[i];
-    const double along = std::clamp((middle_W - path_W[i]).dot(way) / way.squaredNorm(), 0.0, 1.0);
-    const double distance_m = (path_W[i] + along * way - middle_W).norm();
-    if (distance_m < nearest_m) {
-      nearest_m = distance_m;
-      piece = i;
-    }
-  }
-  if ((path_W[piece + 1] - path_W[piece]).norm() < 4.0 * kSameWaypoint_m) return false;
-  Path finer;
-  bool fits = true;
-  for (std::size_t i = 0; i < path_W.size(); ++i) {
-    fits = finer.push_back(path_W[i]) && fits;
-    if (i == piece) fits = finer.push_back(0.5 * (path_W[i] + path_W[i + 1])) && fits;
-  }
-  if (fits) path_W = finer;
-  return fits;
-}
-
-Status Smoother::curve(const Task& task, const Path& path_W, const MotionLimits& limits,
-                       Trajectory& out) const noexcept {
-  Path path = path_W;
-  Plan plan;
-  for (int round = 0; round <= kSplitRounds; ++round) {
-    if (task.budget.spent(task.work)) return Status::kBudgetSpent;
-    if (!allocate({path.begin(), path.size()}, task.request.start, limits, plan)) return Status::kNoPath;
-    if (!stretch_to_limits(task, limits, plan, out)) return Status::kNoPath;
-    std::size_t bad = 0;
-    if (is_trajectory_free(task.view, out, 0.0, task.request.radius_m, task.work.units, &bad))
-      return Status::kOk;
-    if (!split(plan, bad, path)) return Status::kNoPath;
-  }
-  return Status::kNoPath;
-}
-
-Status Smoother::straight_pieces(const Task& task, const Path& path_W, Trajectory& out) noexcept {
-  const SmoothRequest& request = task.request;
-  if (request.start.v_W.norm() > kAtRest || request.start.a_W.norm() > kAtRest) return Status::kNoPath;
-  out.segment_count = 0;
-  for (std::size_t i = 0; i + 1 < path_W.size(); ++i) {
-    if (!append_rest_to_rest(path_W[i], path_W[i + 1], request.limits, out)) return Status::kNoPath;
-  }
-  if (is_trajectory_free(task.view, out, 0.0, request.radius_m, task.work.units)) return Status::kOk;
-  return task.view.spent() ? Status::kBudgetSpent : Status::kNoPath;
-}
+}  // namespace
 
 Status Smoother::smooth(const SmoothRequest& request, const MapView& map, core::StageBudget& budget,
                         SmoothResult& result) noexcept {
@@ -288,35 +160,42 @@ Status Smoother::smooth(const SmoothRequest& request, const MapView& map, core::
   result.work = {};
   if (!is_well_posed(request)) return Status::kInvalidArgument;
   const PolledView view(map, budget, result.work);
-  Path path;
+  core::StaticVector<Vector3, kMaxPoints> path_W;
   for (std::size_t i = 0; i < request.path_W.size(); ++i) {
     const Vector3& p_W = request.path_W[i];
     if (!is_finite(p_W)) return Status::kInvalidArgument;
-    if (!path.empty() && (p_W - path.back()).norm() < kSameWaypoint_m &&
-        !is_needed(view, request, path.back(), i, result.work.units))
+    if (!path_W.empty() && (p_W - path_W.back()).norm() < kSameWaypoint_m &&
+        !is_needed(view, request, path_W.back(), i, result.work.units))
       continue;
-    if (!path.push_back(path.empty() ? request.start.p_W : p_W)) break;
+    if (!path_W.push_back(path_W.empty() ? request.start.p_W : p_W)) break;
   }
-  if (path.size() < 2) return Status::kInvalidArgument;
+  if (path_W.size() < 2) return Status::kInvalidArgument;
 
-  // 2. A curve; slower if there is none.
-  const Task task{request, view, budget, result.work};
-  MotionLimits limits = request.limits;
+  // 2. A curve; tighter where it is not free.
+  Tries tries({path_W.begin(), path_W.size()}, request.start, request.limits);
+  CheckedParts checked;
   Trajectory candidate;
   candidate.start_time = request.start_time;
-  for (int slow = 0; slow < kSlowRounds; ++slow, limits.speed_mps *= 0.6) {
-    const Status status = curve(task, path, limits, candidate);
-    if (status == Status::kBudgetSpent) return status;
-    if (status != Status::kOk) continue;
-    result.trajectory = candidate;
-    return Status::kOk;
+  for (int round = 0; round < kRounds; ++round) {
+    if (budget.spent(result.work)) return Status::kBudgetSpent;
+    SegmentParts part{};
+    const CurveFit fit = fit_curve(tries.course(), request.start, request.limits, candidate, part);
+    bool goes_on = false;
+    if (fit == CurveFit::kOk) {
+      const auto blocked = checked.find_blocked(view, candidate, part, request.radius_m, result.work.units);
+      if (!blocked) {
+        result.trajectory = candidate;
+        return Status::kOk;
+      }
+      if (view.spent()) return Status::kBudgetSpent;
+      goes_on = tries.next_after(*blocked);
+    } else {
+      goes_on = fit == CurveFit::kTooManyPoints ? tries.shorten() : tries.leave_otherwise(true);
+    }
+    if (!goes_on) return Status::kNoPath;
+    if (tries.has_left_otherwise()) checked.forget();
   }
-  if (budget.spent(result.work)) return Status::kBudgetSpent;
-
-  // 3. The last resort.
-  const Status status = straight_pieces(task, path, candidate);
-  if (status == Status::kOk) result.trajectory = candidate;
-  return status;
+  return Status::kNoPath;
 }
 
 Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, const MotionLimits& limits,
@@ -391,21 +270,37 @@ bool append_rest_to_rest(const Vector3& from_W, const Vector3& to_W, const Motio
 
 namespace {
 
-/// Of the curve between two times, along a chord. Around a slanting chord there is more than the vehicle touches, around
+/// Of a segment between two times, along a chord. Around a slanting chord there is more than the vehicle touches, around
 /// parts of it there is less.
-bool is_chord_free(const MapView& view, const Trajectory& trajectory, double from_s, double to_s,
+bool is_chord_free(const MapView& view, const PolynomialSegment& segment, double from_s, double to_s,
                    double radius_m, std::uint64_t& lookups) noexcept {
   constexpr int kParts = 8;
   const Vector3 r = Vector3::Constant(radius_m);
   const auto is_swept_free = [&](const Vector3& a_W, const Vector3& b_W) {
     return view.is_free({a_W.cwiseMin(b_W) - r, a_W.cwiseMax(b_W) + r}, lookups);
   };
-  Vector3 last_W = trajectory.at_s(from_s).p_W;
-  if (is_swept_free(last_W, trajectory.at_s(to_s).p_W)) return true;
+  Vector3 last_W = position_W(segment, from_s);
+  if (is_swept_free(last_W, position_W(segment, to_s))) return true;
   for (int part = 1; part <= kParts; ++part) {
-    const Vector3 p_W = trajectory.at_s(from_s + (to_s - from_s) * part / kParts).p_W;
+    const Vector3 p_W = position_W(segment, from_s + (to_s - from_s) * part / kParts);
     if (!is_swept_free(last_W, p_W)) return false;
     last_W = p_W;
+  }
+  return true;
+}
+
+bool is_rest_free(const MapView& view, const PolynomialSegment& segment, double first_s, double radius_m,
+                  std::uint64_t& lookups, double& at_s) noexcept {
+  // Chords of about half the vehicle's radius, or less where it turns slowly.
+  const double rest_s = segment.duration_s - first_s;
+  const double length_m =
+      (position_W(segment, segment.duration_s) - position_W(segment, first_s)).norm() + 0.1;
+  const double chords = std::max(2.0 * length_m / radius_m, rest_s / kPieceTime_s);
+  const int count = std::clamp(static_cast<int>(chords) + 1, 1, 200);
+  const double step_s = rest_s / count;
+  for (int i = 0; i < count; ++i) {
+    at_s = first_s + i * step_s;
+    if (!is_chord_free(view, segment, at_s, at_s + step_s, radius_m, lookups)) return false;
   }
   return true;
 }
@@ -413,7 +308,7 @@ bool is_chord_free(const MapView& view, const Trajectory& trajectory, double fro
 }  // namespace
 
 double free_until_s(const MapView& view, const Trajectory& trajectory, double from_s, double radius_m,
-                    std::uint64_t& lookups, std::size_t* segment) noexcept {
+                    std::uint64_t& lookups) noexcept {
   constexpr double kForEver = std::numeric_limits<double>::infinity();
   const double start_s = from_s > 0.0 ? from_s : 0.0;
   if (trajectory.segment_count == 0)
@@ -422,19 +317,9 @@ double free_until_s(const MapView& view, const Trajectory& trajectory, double fr
   for (std::size_t k = 0; k < trajectory.segment_count; ++k) {
     const double duration_s = trajectory.segment[k].duration_s;
     const double first_s = std::max(start_s - segment_begin_s, 0.0);
-    if (first_s <= duration_s) {
-      // Chords of about the vehicle's radius; at 6 m/s the curve leaves such a chord by less than 2 cm.
-      const Vector3 from_W = trajectory.at_s(segment_begin_s + first_s).p_W;
-      const double length_m = (trajectory.at_s(segment_begin_s + duration_s).p_W - from_W).norm() + 0.1;
-      const int count = std::clamp(static_cast<int>(2.0 * length_m / radius_m), 6, 200);
-      const double step_s = (duration_s - first_s) / count;
-      for (int i = 0; i < count; ++i) {
-        const double at_s = segment_begin_s + first_s + i * step_s;
-        if (is_chord_free(view, trajectory, at_s, at_s + step_s, radius_m, lookups)) continue;
-        if (segment != nullptr) *segment = k;
-        return at_s;
-      }
-    }
+    double at_s = 0.0;
+    if (first_s <= duration_s && !is_rest_free(view, trajectory.segment[k], first_s, radius_m, lookups, at_s))
+      return segment_begin_s + at_s;
     segment_begin_s += duration_s;
   }
   return kForEver;

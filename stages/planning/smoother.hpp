@@ -13,7 +13,6 @@
 #include "core/vehicle_model.hpp"
 #include "firmware_if/status.hpp"
 #include "stages/perception/polled_view.hpp"
-#include "stages/planning/minimum_snap.hpp"
 
 namespace roborun::stages {
 
@@ -24,10 +23,13 @@ struct MotionLimits {
   double jerk_mps3{VehicleModel{}.jerk_mps3};  ///< (0, 1000]. Beyond it the vehicle overshoots the attitude.
   double climb_mps{30.0};                      ///< (0, 30]. Upwards ...
   double descent_mps{30.0};                    ///< (0, 30]. ... and downwards.
+  double vertical_mps2{30.0};     ///< (0, 30]. Of the acceleration, what is up or down on legs and in turns.
+  double speeding_up_mps2{30.0};  ///< (0, 30]. Of it, what the speed may rise with on straight pieces.
   [[nodiscard]] constexpr Status validate() const noexcept {
     const bool ok = core::above(speed_mps, 0.0, 30.0) && core::above(acceleration_mps2, 0.0, 30.0) &&
                     core::above(jerk_mps3, 0.0, 1000.0) && core::above(climb_mps, 0.0, 30.0) &&
-                    core::above(descent_mps, 0.0, 30.0);
+                    core::above(descent_mps, 0.0, 30.0) && core::above(vertical_mps2, 0.0, 30.0) &&
+                    core::above(speeding_up_mps2, 0.0, 30.0);
     return ok ? Status::kOk : Status::kInvalidArgument;
   }
 };
@@ -47,15 +49,17 @@ struct SmoothResult {
 
 class Smoother {
  public:
-  /// Time is given by a trapezoidal speed profile along the path under the limits (corners slower), with a
-  /// way-point where the final braking begins; the curve is then checked: too fast, and the segment gets more
-  /// time; not free, and the straight piece below it gets one more way-point; still not, and the speed limit
-  /// is lowered; from rest, the last resort is to fly the pieces straight and stop at each corner. kOk: every
-  /// point of the trajectory keeps its box free in `view`, and speed, acceleration and jerk are
-  /// within the limits (5 %; where the start state itself is beyond a limit, never more beyond than there).
+  /// The path in straight pieces and turns, in closed form (speed_change.hpp): a turn begins as far before its corner as the
+  /// room on both sides allows and keeps its speed at both ends, and between turns the speed goes up and down again as late
+  /// as it can. The first change leads from the start state onto a straight line to the next point. What is not free in
+  /// `view` is tried again, tighter at that corner, at last with a stop there; at the start slower, at last after a
+  /// stop on the line of the present velocity. kOk: every point of the trajectory keeps its box free in `view`; speed,
+  /// acceleration and jerk are within the limits (where the start state is beyond a limit, never more beyond than the
+  /// jerk limit makes necessary); it ends at the last point of the path, or at one before where there are more
+  /// points than a trajectory has segments for.
   /// kNoPath: no such curve was found; kBudgetSpent; kInvalidArgument (not finite, fewer than two distinct
-  /// points): in all three cases `result.trajectory` is untouched. Polls the budget before each solution and,
-  /// while a curve is checked, every 1,024 lookups. RT-safe: at most 280 solutions of at most 47 segments.
+  /// points): in all three cases `result.trajectory` is untouched. Polls the budget before each round and,
+  /// while a curve is checked, every 1,024 lookups. RT-safe: at most kRounds curves.
   [[nodiscard]] Status smooth(const SmoothRequest& request, const MapView& view, core::StageBudget& budget,
                               SmoothResult& result) noexcept;
 
@@ -65,46 +69,9 @@ class Smoother {
   [[nodiscard]] Status brake(const TrajectoryPoint& start, MonotonicTime start_time,
                              const MotionLimits& limits, Trajectory& out) const noexcept;
 
- private:
-  static constexpr std::size_t kMaxKnots = MinimumSnap::kMaxKnots;
-  struct SpeedProfile;
-  struct Plan {
-    std::size_t count{};  ///< Knots.
-    std::array<Vector3, kMaxKnots> knot_W;
-    std::array<double, kMaxKnots> time_s;  ///< Of the segment that ends at the knot.
-    std::size_t brake_knot{};              ///< Where the final braking begins.
-
-    /// False if there is no room for another knot.
-    [[nodiscard]] bool add(const Vector3& p_W, double duration_s) noexcept;
-    [[nodiscard]] bool add_piece(const Vector3& from_W, const Vector3& to_W, const SpeedProfile& profile,
-                                 bool last) noexcept;
-  };
-
-  /// What one call of smooth() works on.
-  struct Task {
-    const SmoothRequest& request;
-    const PolledView& view;
-    core::StageBudget& budget;
-    core::Work& work;
-  };
-  using Path = core::StaticVector<Vector3, kMaxKnots>;
-
-  [[nodiscard]] static bool allocate(std::span<const Vector3> path_W, const TrajectoryPoint& start,
-                                     const MotionLimits& limits, Plan& plan) noexcept;
-  [[nodiscard]] bool solve(const Plan& plan, const TrajectoryPoint& start, Trajectory& out) const noexcept;
-  /// False if the limits cannot be met, or the budget is spent.
-  [[nodiscard]] bool stretch_to_limits(const Task& task, const MotionLimits& limits, Plan& plan,
-                                       Trajectory& out) const noexcept;
-  /// One more way-point in the middle of the straight piece that a segment of the curve belongs to. False if
-  /// there is no room for it.
-  [[nodiscard]] static bool split(const Plan& plan, std::size_t segment, Path& path_W) noexcept;
-  /// A free curve under these limits. kOk, kBudgetSpent, or kNoPath: slower, perhaps.
-  [[nodiscard]] Status curve(const Task& task, const Path& path_W, const MotionLimits& limits,
-                             Trajectory& out) const noexcept;
-  /// The last resort from rest: straight pieces with a stop at each corner.
-  [[nodiscard]] static Status straight_pieces(const Task& task, const Path& path_W, Trajectory& out) noexcept;
-
-  MinimumSnap minimum_snap_;
+  static constexpr std::size_t kMaxPoints =
+      16;  ///< Of a path, the start included; what is beyond is left out.
+  static constexpr int kRounds = 40;
 };
 
 /// Adds a straight piece from rest at `from_W` to rest at `to_W` within the limits, and makes its second half
@@ -113,15 +80,12 @@ class Smoother {
                                        Trajectory& trajectory) noexcept;
 
 /// Seconds after its start up to which the curve, from `from_s` on, keeps its box free; +infinity if to its
-/// end. `segment` (may be null) is set to the segment in which it does not. RT-safe: O(length / radius).
+/// end. RT-safe: O(length / radius).
 [[nodiscard]] double free_until_s(const MapView& view, const Trajectory& trajectory, double from_s,
-                                  double radius_m, std::uint64_t& lookups,
-                                  std::size_t* segment = nullptr) noexcept;
+                                  double radius_m, std::uint64_t& lookups) noexcept;
 [[nodiscard]] inline bool is_trajectory_free(const MapView& view, const Trajectory& trajectory, double from_s,
-                                             double radius_m, std::uint64_t& lookups,
-                                             std::size_t* segment = nullptr) noexcept {
-  return free_until_s(view, trajectory, from_s, radius_m, lookups, segment) ==
-         std::numeric_limits<double>::infinity();
+                                             double radius_m, std::uint64_t& lookups) noexcept {
+  return free_until_s(view, trajectory, from_s, radius_m, lookups) == std::numeric_limits<double>::infinity();
 }
 
 }  // namespace roborun::stages

@@ -180,34 +180,40 @@ void WayMemory::give_back(std::int32_t block) noexcept {
 
 bool WayMemory::read_window(const MapView& map, const Cell& low, const Cell& high, core::StageBudget& budget,
                             core::Work& work) noexcept {
-  std::size_t i = 0;
+  std::size_t count = 0;
   for (std::int32_t z = low.z; z <= high.z + 1; ++z) {
     for (std::int32_t y = low.y; y <= high.y + 1; ++y) {
       if (budget.spent(work)) return false;
-      for (std::int32_t x = low.x; x <= high.x + 1; ++x, ++i) {
+      for (std::int32_t x = low.x; x <= high.x + 1; ++x, ++count) {
         const Vector3 corner_W =
             config_.finest_m *
             Vector3(corner_.x + kBlockCells * x, corner_.y + kBlockCells * y, corner_.z + kBlockCells * z);
-        Seen& seen = window_[i];
+        Seen& seen = window_[place_in_window({x, y, z})];
+        const std::uint64_t revision = blocks_revision(map, corner_W, config_.finest_m, work.units);
+        if (revision != 0 && seen.block == Cell{x, y, z} && seen.revision == revision) continue;
+        seen.block = {x, y, z};
+        seen.revision = revision;
         seen.content = read_blocks(map, corner_W, config_.finest_m, seen.cells, work.units);
         seen.digest = seen.content == BlockContent::kMixed ? digest_of(seen.cells)
                                                            : static_cast<std::uint64_t>(seen.content);
       }
     }
   }
-  window_pool_.use(i);
+  window_pool_.use(count);
   return true;
 }
 
-std::uint64_t WayMemory::cells_at(const Cell& block, const Cell& low, const Cell& high,
-                                  WayCells& cells) const noexcept {
-  const std::int32_t wide_x = high.x - low.x + 2, wide_y = high.y - low.y + 2;
+std::size_t WayMemory::place_in_window(const Cell& block) noexcept {
+  const auto within = [](std::int32_t at, std::int32_t size) { return static_cast<std::size_t>(at % size); };
+  return (within(block.z, kWindowHeight + 1) * (kWindow + 1) + within(block.y, kWindow + 1)) * (kWindow + 1) +
+         within(block.x, kWindow + 1);
+}
+
+std::uint64_t WayMemory::cells_at(const Cell& block, WayCells& cells) const noexcept {
   std::uint64_t digest = 0;
   for (std::int32_t i = 0; i < 8; ++i) {
-    const std::int32_t x = block.x - low.x + (i & 1), y = block.y - low.y + ((i >> 1) & 1),
-                       z = block.z - low.z + (i >> 2);
-    const std::int32_t w = (z * wide_y + y) * wide_x + x;
-    const Seen& seen = window_[static_cast<std::size_t>(w)];
+    const Seen& seen =
+        window_[place_in_window({block.x + (i & 1), block.y + ((i >> 1) & 1), block.z + (i >> 2)})];
     cells.block[static_cast<std::size_t>(i)] = &seen.cells;
     cells.content[static_cast<std::size_t>(i)] = seen.content;
     digest = core::mix64(digest + seen.digest + 1);
@@ -240,7 +246,7 @@ Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, c
     for (std::int32_t y = low.y; y <= high.y; ++y) {
       for (std::int32_t x = low.x; x <= high.x; ++x) {
         WayCells cells;
-        const std::uint64_t digest = cells_at({x, y, z}, low, high, cells);
+        const std::uint64_t digest = cells_at({x, y, z}, cells);
         std::uint64_t& before = position_[position_of({x, y, z})].digest;
         if (before == digest) continue;
         work.units += kWorkOfABlock;
@@ -306,7 +312,7 @@ void WayMemory::forbid(const Cell& block, WayPlaces& places) const noexcept {
 
 void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   WayPlaces places;
-  find_places(cells, width_, places);
+  find_places(cells, width_, 0, places);
   forbid(block, places);
   const auto all = [](const CellRows& rows, std::uint16_t value) {
     return std::all_of(rows.begin(), rows.end(), [value](std::uint16_t row) { return row == value; });

@@ -55,6 +55,7 @@ class WayMemory final : public Ways {
  private:
   struct Cell {
     std::int32_t x, y, z;
+    [[nodiscard]] bool operator==(const Cell&) const noexcept = default;
   };
   /// From a room of this block to one of the block beyond a face, or (kInside) from a known to an open one.
   struct Door {
@@ -84,13 +85,15 @@ class WayMemory final : public Ways {
   };
   /// A block of the map.
   struct Seen {
+    Cell block{-1, -1, -1};
+    std::uint64_t revision{};  ///< Of the map, when it was read.
     CellBlock cells{};
     BlockContent content{};
     std::uint64_t digest{};
   };
   static constexpr std::uint32_t kFar = 0xFFFFFFFFU;
-  static constexpr double kMost_m = 1e5;  ///< Of any coordinate.
   static constexpr std::uint32_t kNowhere = 0xFFFFFFFFU;
+  static constexpr double kMost_m = 1e5;  ///< Of any coordinate.
   struct Node {
     std::uint32_t cost{kFar};
     std::uint32_t next{kNowhere};  ///< Towards the goal.
@@ -118,12 +121,14 @@ class WayMemory final : public Ways {
   /// The nearest place that is not closed (known, if there is one), at most two cells away.
   [[nodiscard]] bool nearest_room(const Vector3& p_W, Cell& place) const noexcept;
   [[nodiscard]] std::uint32_t node_of(std::uint32_t position, unsigned room) const noexcept;
-  /// The cells of blocks low .. high, and of one more to the far sides: vehicles reach into it. False: budget spent.
+  /// The cells of blocks low .. high, and of one more to the far sides: vehicles reach into it. What did not change is not read
+  /// again. False: budget spent.
   [[nodiscard]] bool read_window(const MapView& map, const Cell& low, const Cell& high,
                                  core::StageBudget& budget, core::Work& work) noexcept;
+  /// Blocks of one look have places of their own, and keep them from look to look.
+  [[nodiscard]] static std::size_t place_in_window(const Cell& block) noexcept;
   /// A block of the window and the seven that follow it; returns their digest.
-  [[nodiscard]] std::uint64_t cells_at(const Cell& block, const Cell& low, const Cell& high,
-                                       WayCells& cells) const noexcept;
+  [[nodiscard]] std::uint64_t cells_at(const Cell& block, WayCells& cells) const noexcept;
   void renew(const Cell& block, const WayCells& cells) noexcept;
   void forbid(const Cell& block, WayPlaces& places) const noexcept;
   /// Of a block that changed, and of its neighbours to it.
@@ -153,19 +158,26 @@ class WayMemory final : public Ways {
   [[nodiscard]] std::uint32_t step_cost(const Cell& from, const Cell& to, double price) const noexcept;
   void wait_at(const Vector3& p_W) noexcept;
 
-  /// Of a block: places with room, known or not, and what was seen free where that is too narrow for it.
+  /// Of a block: where the body may fit. What of it nobody has seen joins the open places: it may turn out to have room.
   [[nodiscard]] CellRows find_passable(const Cell& block, const WayCells& cells,
-                                       const WayPlaces& places) const noexcept;
+                                       WayPlaces& places) const noexcept;
   /// kNoPath: none of what may be passable leads from one to the other, within what was seen; kInfeasible: some does;
   /// kBudgetSpent.
   [[nodiscard]] Status may_lead(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
                                 core::Work& work) noexcept;
+  /// The k-th of those that count as the same place.
+  [[nodiscard]] static Cell near(const Cell& place, std::int32_t k) noexcept;
+  void begin_again() noexcept;
+  /// A place on the way to `to`. False: outside the search.
+  [[nodiscard]] bool begin_at(const Cell& place, const Cell& to) noexcept;
+  /// From where it began. kNoPath: to everything that can be come to, and not near `place`; kInfeasible: to there, too;
+  /// kNotReady: to what nobody has seen; kBudgetSpent.
+  [[nodiscard]] Status spread_to(const Cell& place, core::StageBudget& budget, core::Work& work) noexcept;
   /// A block that `rows` of may be come to from beside it.
   void pass_into(const Cell& block, const CellRows& rows, const Cell& goal) noexcept;
   /// From a block to the six beside it.
   void pass_on(const Cell& block, const Cell& goal) noexcept;
   [[nodiscard]] bool has_passed(const Cell& place) const noexcept;
-  [[nodiscard]] bool has_passed_near(const Cell& place) const noexcept;
   /// Never seen, and the world goes on.
   [[nodiscard]] bool passes_beyond(const Cell& block) const noexcept;
   /// The place of the cube in the middle of the body.

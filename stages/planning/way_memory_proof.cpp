@@ -8,7 +8,8 @@ namespace {
 constexpr std::uint64_t kWorkOfAVisit = 8;  // lookups that a block counts as
 constexpr std::uint32_t kVisitsPerPoll = 16;
 constexpr std::uint32_t kMostVisits = 1U << 20U;
-constexpr std::int32_t kNear = 2;  // cells: what counts as the goal's
+constexpr std::int32_t kNear = 2;  // cells: what counts as a place itself
+constexpr std::int32_t kNearPlaces = (2 * kNear + 1) * (2 * kNear + 1) * (2 * kNear + 1);
 constexpr std::size_t kRow = kBlockCells;
 
 bool any(const CellRows& rows) noexcept {
@@ -38,10 +39,10 @@ CellRows across(const CellRows& rows, std::size_t face) noexcept {
 }  // namespace
 
 CellRows WayMemory::find_passable(const Cell& block, const WayCells& cells,
-                                  const WayPlaces& places) const noexcept {
+                                  WayPlaces& places) const noexcept {
   WayPlaces cores;
-  find_places(cells, core_width_, cores);
-  CellRows passable = cores.known;
+  find_places(cells, core_width_, width_ - core_width_, cores);
+  CellRows passable{};
   const std::array<std::int32_t, 3> first{kBlockCells * block.x + corner_.x,
                                           kBlockCells * block.y + corner_.y,
                                           kBlockCells * block.z + corner_.z};
@@ -57,18 +58,18 @@ CellRows WayMemory::find_passable(const Cell& block, const WayCells& cells,
     }
   }
   for (unsigned i = 0; i < 256; ++i) {
-    std::uint16_t& row = passable[i];
     const bool is_inside = ((inside[1] >> (i % kRow)) & (inside[2] >> (i / kRow)) & 1U) != 0;
-    row = static_cast<std::uint16_t>(is_inside ? row & inside[0] : 0U);
+    const unsigned found = static_cast<unsigned>(cores.known[i]) | cores.open[i];
+    unsigned row = is_inside ? found & inside[0] : 0U;
     for (unsigned bits = config_.fence.empty() ? 0U : row; bits != 0; bits &= bits - 1) {
       const int x = __builtin_ctz(bits);
       const Vector3 low(first[0] + x, first[1] + static_cast<int>(i % kRow),
                         first[2] + static_cast<int>(i / kRow));
       const Aabb cube_W{config_.finest_m * low, config_.finest_m * (low + Vector3::Constant(core_width_))};
-      if (!config_.fence.allows(cube_W))
-        row = static_cast<std::uint16_t>(row & ~(1U << static_cast<unsigned>(x)));
+      if (!config_.fence.allows(cube_W)) row &= ~(1U << static_cast<unsigned>(x));
     }
-    row = static_cast<std::uint16_t>(row | places.known[i] | places.open[i]);
+    places.open[i] = static_cast<std::uint16_t>(places.open[i] | (row & cores.open[i] & ~places.known[i]));
+    passable[i] = static_cast<std::uint16_t>(row | places.known[i] | places.open[i]);
   }
   return passable;
 }
@@ -143,38 +144,59 @@ bool WayMemory::passes_beyond(const Cell& block) const noexcept {
          ends(block.z, low_.z, high_.z, size_.z);
 }
 
-bool WayMemory::has_passed_near(const Cell& place) const noexcept {
-  for (std::int32_t i = 0; i < 125; ++i)
-    if (has_passed({place.x + i % 5 - kNear, place.y + i / 5 % 5 - kNear, place.z + i / 25 - kNear}))
-      return true;
-  return false;
+WayMemory::Cell WayMemory::near(const Cell& place, std::int32_t k) noexcept {
+  constexpr std::int32_t kAcross = 2 * kNear + 1;
+  return {place.x + k % kAcross - kNear, place.y + k / kAcross % kAcross - kNear,
+          place.z + k / (kAcross * kAcross) - kNear};
 }
 
-Status WayMemory::may_lead(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
-                           core::Work& work) noexcept {
+bool WayMemory::begin_at(const Cell& place, const Cell& to) noexcept {
+  const Cell block{place.x >> 4, place.y >> 4, place.z >> 4};
+  if (!in_search(block)) return false;
+  CellRows rows{};
+  rows[kRow * static_cast<std::size_t>(place.z & 15) + static_cast<std::size_t>(place.y & 15)] =
+      static_cast<std::uint16_t>(1U << static_cast<unsigned>(place.x & 15));
+  pass_into(block, rows, {to.x >> 4, to.y >> 4, to.z >> 4});
+  return true;
+}
+
+void WayMemory::begin_again() noexcept {
   ++search_;
   reached_.clear();
   overflown_ = false;
-  const Cell start = core_at(from_W), goal = core_at(goal_W);
-  const Cell first{start.x >> 4, start.y >> 4, start.z >> 4};
-  const Cell last{goal.x >> 4, goal.y >> 4, goal.z >> 4};
-  if (!in_search(first)) return Status::kInfeasible;
-  CellRows from{};
-  from[kRow * static_cast<std::size_t>(start.z & 15) + static_cast<std::size_t>(start.y & 15)] =
-      static_cast<std::uint16_t>(1U << static_cast<unsigned>(start.x & 15));
-  pass_into(first, from, last);
-  if (!has_passed(start)) return Status::kInfeasible;  // it is where nothing can be
+}
+
+Status WayMemory::spread_to(const Cell& place, core::StageBudget& budget, core::Work& work) noexcept {
+  const Cell last{place.x >> 4, place.y >> 4, place.z >> 4};
   for (std::uint32_t i = 1; !reached_.empty(); ++i) {
     if (i > kMostVisits || (i % kVisitsPerPoll == 0 && budget.spent(work))) return Status::kBudgetSpent;
     const auto position = static_cast<std::uint32_t>(reached_.pop());
     work.units += kWorkOfAVisit;
     const Cell block = block_at(position);
-    if (passes_beyond(block)) return Status::kInfeasible;
+    if (passes_beyond(block)) return Status::kNotReady;
     node_[node_of(position, 0)].cost = kFar;
     pass_on(block, last);
-    if (has_passed_near(goal)) return Status::kInfeasible;
+    for (std::int32_t k = 0; k < kNearPlaces; ++k)
+      if (has_passed(near(place, k))) return Status::kInfeasible;
   }
   return overflown_ ? Status::kBudgetSpent : Status::kNoPath;
+}
+
+Status WayMemory::may_lead(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
+                           core::Work& work) noexcept {
+  const Cell start = core_at(from_W), goal = core_at(goal_W);
+  begin_again();
+  if (!begin_at(start, goal) || !has_passed(start)) return Status::kInfeasible;  // it is where nothing can be
+  // The goal's side first: a shell around it is seen sooner than everything around the vehicle.
+  begin_again();
+  bool inside = true;
+  for (std::int32_t k = 0; k < kNearPlaces; ++k) inside = begin_at(near(goal, k), start) && inside;
+  const Status status = inside ? spread_to(start, budget, work) : Status::kNotReady;
+  if (status != Status::kNotReady) return status;
+  begin_again();
+  (void)begin_at(start, goal);
+  const Status other = spread_to(goal, budget, work);
+  return other == Status::kNotReady ? Status::kInfeasible : other;
 }
 
 }  // namespace roborun::stages

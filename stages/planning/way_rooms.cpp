@@ -36,8 +36,8 @@ void double_up(int width, const Or& or_with) noexcept {
 }
 
 /// Each cell becomes true if any of the `width` cells from it on is, along all three axes. What the upper half of a row
-/// shifts into the lower one is above its places.
-void spread(std::size_t side, int width, WideRows& rows) noexcept {
+/// shifts into the lower one is above its places. `places`: wanted along each axis.
+void spread(std::size_t side, int width, std::size_t places, WideRows& rows) noexcept {
   for (std::size_t z = 0; z < side; ++z) {
     const auto plane = rows.begin() + static_cast<std::ptrdiff_t>(kSide * z);
     double_up(width, [&](int by) {
@@ -54,7 +54,7 @@ void spread(std::size_t side, int width, WideRows& rows) noexcept {
   double_up(width, [&](int by) {
     const auto next = static_cast<std::size_t>(by);
     for (std::size_t z = 0; z + next < side; ++z) {
-      for (std::size_t y = 0; y < kBlockCells; ++y) rows[kSide * z + y] |= rows[kSide * (z + next) + y];
+      for (std::size_t y = 0; y < places; ++y) rows[kSide * z + y] |= rows[kSide * (z + next) + y];
     }
   });
 }
@@ -90,16 +90,33 @@ void number(CellRows rows, unsigned first, unsigned last, WayRooms& rooms) noexc
 
 }  // namespace
 
-void find_places(const WayCells& cells, int width, WayPlaces& places) noexcept {
-  const auto side = static_cast<std::size_t>(kBlockCells + width - 1);
+void find_places(const WayCells& cells, int width, int beyond, WayPlaces& places) noexcept {
+  const std::size_t count = std::size_t{kBlockCells} + static_cast<std::size_t>(beyond);
+  const std::size_t side = count + static_cast<std::size_t>(width) - 1;
   WideRows rows{};
   gather(cells, side, rows);
-  spread(side, width, rows);
+  spread(side, width, count, rows);
+  const std::uint64_t all = (std::uint64_t{1} << count) - 1;
+  // From here on known places in the upper half of a row, open ones in the lower one.
+  for (std::uint64_t& row : rows) {
+    const std::uint64_t blocked = row >> 32U;
+    row = (~blocked & all) << 32U | (blocked & ~row & all);
+  }
+  for (int step = 0; step < beyond; ++step) {
+    for (std::size_t z = 0; z < count; ++z) {
+      for (std::size_t y = 0; y < count; ++y) {
+        std::uint64_t& row = rows[kSide * z + y];
+        std::uint64_t near = (row & all) >> 1U;
+        if (y + 1 < count) near |= rows[kSide * z + y + 1] & all;
+        if (z + 1 < count) near |= rows[kSide * (z + 1) + y] & all;
+        row |= near & row >> 32U;
+      }
+    }
+  }
   for (std::size_t i = 0; i < places.known.size(); ++i) {
     const std::uint64_t row = rows[kSide * (i / kBlockCells) + i % kBlockCells];
-    const std::uint64_t blocked = row >> 32U, shut = row;
-    places.known[i] = static_cast<std::uint16_t>(~blocked);
-    places.open[i] = static_cast<std::uint16_t>(blocked & ~shut);
+    places.known[i] = static_cast<std::uint16_t>(row >> 32U);
+    places.open[i] = static_cast<std::uint16_t>(row);
   }
 }
 

@@ -35,7 +35,9 @@ struct WayCells {
 struct WayPlaces {
   CellRows known{}, open{};
 };
-void find_places(const WayCells& cells, int width, WayPlaces& places) noexcept;
+/// Open are the known ones, too, that are at most `beyond` places before an open one: a vehicle that is so much wider ends there, before a
+/// hole that a narrow one looks into. width + beyond at most 17. RT-safe: O(beyond * 32^2) rounds.
+void find_places(const WayCells& cells, int width, int beyond, WayPlaces& places) noexcept;
 /// All places that are connected with those of `room`, of those in `rows`. RT-safe: O(256 * 16) rounds.
 void flood(const CellRows& rows, CellRows& room) noexcept;
 /// Numbers the rooms. RT-safe: O(rooms * 256 * 16).

@@ -13,8 +13,10 @@
 
 #include "firmware_if/can.hpp"
 #include "platform/can/socket_can.hpp"
+#include "platform/sensor_port/port_bus.hpp"
 #include "platform/sitl/bus/fake_can.hpp"
 #include "tests/support/no_alloc_scope.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace roborun::firmware_if {
 namespace {
@@ -62,8 +64,27 @@ class KernelPair final : public Pair {
   can::SocketCan b_;
 };
 
+/// Two processes' ends of a pair of sensor ports.
+class PortPair final : public Pair {
+ public:
+  PortPair() {
+    const std::string there = test::scratch("roborun-there"), back = test::scratch("roborun-back");
+    EXPECT_EQ(a_.speak(there, {}), "");
+    EXPECT_EQ(b_.speak(back, {}), "");
+    EXPECT_EQ(a_.listen(back, {}), "");
+    EXPECT_EQ(b_.listen(there, {}), "");
+  }
+  CanBus& a() override { return a_; }
+  CanBus& b() override { return b_; }
+  void wait() override {}
+
+ private:
+  sensor_port::PortCan a_;
+  sensor_port::PortCan b_;
+};
+
 std::vector<std::string> implementations() {
-  std::vector<std::string> out{"fake"};
+  std::vector<std::string> out{"fake", "port"};
   const char* names = std::getenv("ROBORUN_TEST_CAN");
   std::istringstream in(names == nullptr ? "" : names);
   for (std::string pair; in >> pair;) out.push_back(pair);
@@ -75,6 +96,8 @@ class CanBusContract : public testing::TestWithParam<std::string> {
   void SetUp() override {
     if (GetParam() == "fake") {
       pair_ = std::make_unique<FakePair>();
+    } else if (GetParam() == "port") {
+      pair_ = std::make_unique<PortPair>();
     } else {
       pair_ = std::make_unique<KernelPair>(GetParam());
     }
@@ -108,7 +131,8 @@ TEST_P(CanBusContract, CarriesEveryLengthAndIdentifierBothWays) {
         ++carried;
       }
     }
-    if (GetParam() != "fake" && size == 1) size = 7;  // 100 ms each: the ends are enough
+    if (GetParam() != "fake" && GetParam() != "port" && size == 1)
+      size = 7;  // 100 ms each: the ends are enough
   }
   EXPECT_GE(carried, 30);
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -44,16 +45,21 @@ TEST(VehicleModel, RefusesWhatCannotHoverTiltFlyFastOrStop) {
   EXPECT_NE(cannot_fly(VehicleModel{}, 1.0), nullptr) << "sees less than its stop and its radius";
 }
 
-/// The distance of v (1 - S(t/T)) with the shortest T that both limits allow, summed up in small steps.
+/// The distance of a stop with constant jerk, constant deceleration, and constant jerk, summed up in small steps.
 double stop_by_steps_m(double v, double a, double j) {
-  const double T = std::max(35.0 / 16.0 * v / a, std::sqrt(7.5132 * v / j));
-  double sum_m = 0.0;
+  const double ramp_s = std::min(a / j, std::sqrt(v / j));
+  const double hold_s = v / (j * ramp_s) - ramp_s;
+  const double T = 2.0 * ramp_s + hold_s;
+  double sum_m = 0.0, speed_mps = v;
   constexpr int kSteps = 20000;
+  const double step_s = T / kSteps;
   for (int i = 0; i < kSteps; ++i) {
-    const double x = (i + 0.5) / kSteps;
-    const double s = x * x * x * x * (35.0 - 84.0 * x + 70.0 * x * x - 20.0 * x * x * x);
-    sum_m += v * (1.0 - s) * T / kSteps;
+    const double middle_s = (i + 0.5) * step_s;
+    const double braking_mps2 = j * std::min({middle_s, ramp_s, T - middle_s});
+    sum_m += (speed_mps - 0.5 * braking_mps2 * step_s) * step_s;
+    speed_mps -= braking_mps2 * step_s;
   }
+  EXPECT_NEAR(speed_mps, 0.0, 1e-3 * v);
   return sum_m;
 }
 
@@ -66,14 +72,36 @@ TEST(StoppingModel, DerivedFromTheLimitsIsNeverShorterThanTheStopItStandsFor) {
       v.jerk_mps3 = j;
       const StoppingModel sut = stopping_model(v);
       EXPECT_EQ(sut.validate(), Status::kOk);
+      const auto [flown_mps2, flown_mps3] = followed_limits(v);
+      EXPECT_LE(flown_mps2, a);
+      EXPECT_LE(flown_mps3, j);
       for (double speed = 0.1; speed <= 20.0; speed += 0.1)
-        EXPECT_GE(sut.distance_m(speed), stop_by_steps_m(speed, a, j)) << a << " " << j << " " << speed;
+        EXPECT_GE(sut.distance_m(speed), stop_by_steps_m(speed, flown_mps2, flown_mps3))
+            << a << " " << j << " " << speed;
       // And no more than a tenth longer where acceleration alone decides, lag and tracking error aside.
-      const double fast = 40.0 * a * a / j;
+      const double fast = 40.0 * flown_mps2 * flown_mps2 / flown_mps3;
       const double own = fast * v.motor_lag_s + v.tracking_error_m;
-      EXPECT_LE(sut.distance_m(fast) - own, 1.1 * stop_by_steps_m(fast, a, j));
+      EXPECT_LE(sut.distance_m(fast) - own, 1.1 * stop_by_steps_m(fast, flown_mps2, flown_mps3));
     }
   }
+}
+
+TEST(FollowedLimits, DragTakesFromSpeedingUpAndLeavesTheBrakes) {
+  VehicleModel fast;
+  fast.speed_mps = 12.0;
+  VehicleModel slow = fast;
+  slow.speed_mps = 6.0;
+  // Tilted as far as four fifths of its tilt, it turns at the top speed as hard as it brakes.
+  const double tilt_mps2 = tilt_acceleration_mps2(fast), drag = drag_mps2(fast, fast.speed_mps);
+  const double turn_mps2 = followed_limits(fast).acceleration_mps2;
+  EXPECT_LE(turn_mps2 * turn_mps2 + drag * drag, tilt_mps2 * tilt_mps2);
+  EXPECT_DOUBLE_EQ(turn_mps2, followed_limits(slow).acceleration_mps2);
+  for (double speed = 1.0; speed < 12.0; speed += 1.0) {
+    EXPECT_LE(speeding_up_mps2(fast, speed) + drag_mps2(fast, speed), tilt_mps2) << speed;
+    EXPECT_LE(speeding_up_mps2(fast, speed + 1.0), speeding_up_mps2(fast, speed)) << speed;
+    EXPECT_EQ(speeding_up_mps2(fast, speed), speeding_up_mps2(slow, speed)) << speed;
+  }
+  EXPECT_LT(speeding_up_mps2(fast, 12.0), turn_mps2);
 }
 
 TEST(StoppingModel, DerivedAndMeasuredAgreeForTheVehicleThatWasMeasured) {

@@ -37,6 +37,32 @@ for line in 'int* p = new int;' 'void* p = malloc(4);' 'std::vector<int> v;' 'th
 done
 fresh; echo '// a new thread may throw' >"$tree/core/comment.cpp"; expect passes words "words in a comment"
 
+# page TEXT...: README.md with these lines; other.md has two headings of one name and an id.
+page() {
+  fresh
+  printf '%s\n' '# Other: a `page`' '## Twice' '## Twice' '<a id="here"></a>' >"$tree/other.md"
+  printf '%s\n' '# First' '[all](other.md)' "$@" >"$tree/README.md"
+}
+for line in '[a](other.md#other-a-page)' '[a](other.md#twice-1)' '[a](other.md#here)' '[a](#first)' '[folder](core) [file](core/clean.hpp)' '![p](other.md "title")' \
+  '[far](https://example.org/none) <mailto:a@b>' '`[code](none.md)`' '[r]: other.md'; do
+  page "$line"; expect passes links "$line"
+done
+for line in '[a](none.md)' '[a](Other.md)' '[a](other.md#none)' '[a](other.md#twice-2)' '[a](#none)' '[a](../outside.md)' '[a](/other.md)' '[a](core/clean.hpp#x)' \
+  '![p](none.svg)' '[![p](none.svg)](other.md)' '[![p](other.md)](none.md)' '[r]: none.md' '<img src="none.svg">' '- a [b](none.md) c'; do
+  page "$line"; expect refuses links "$line"
+done
+page '[a' 'b](none.md)'; expect refuses links "a link over two lines"
+page '[a](' 'none.md)'; expect refuses links "a target in the next line"
+page '`code' '[a](none.md)`'; expect passes links "a link in code over two lines"
+page 'a ` alone' '' '[a](none.md) `'; expect refuses links "a link between marks of two paragraphs"
+page '| ` |' '| [a](none.md) ` |'; expect refuses links "a link between marks of two rows"
+page '```' '[a](none.md)' '```'; expect passes links "a link in fenced code"
+page '```' '```' '[a](none.md)'; expect refuses links "a link behind fenced code"
+page '```' '# Fenced' '```' '[a](#fenced)'; expect refuses links "a heading in fenced code"
+page; echo '# Alone' >"$tree/core/alone.md"; expect refuses links "a page that no link leads to"
+page; mkdir -p "$tree/build"; echo '[a](none.md)' >"$tree/build/README.md"; expect passes links "a page of a build"
+fresh; expect refuses links "nothing to check"
+
 # lines COUNT TEXT: the text, so many times.
 lines() { for ((i = 0; i < $1; ++i)); do printf '%s\n' "$2"; done; }
 for folder in firmware_if core governor stages platform/flight; do
@@ -65,6 +91,8 @@ if command -v c++ >/dev/null; then
   echo 'int two() { return 2; }' | c++ -x c++ -c -o "$tree/good.o" - && ar rc "$tree/good.a" "$tree/good.o"
   "$root/toolchain/lint/symbols" "$tree/bad.a" >/dev/null 2>&1 && { echo "FAILED symbols: an archive that calls malloc passes"; failed=1; }
   "$root/toolchain/lint/symbols" "$tree/good.a" >/dev/null 2>&1 || { echo "FAILED symbols: a clean archive is refused"; failed=1; }
+  echo 'int main() {}' | c++ -x c++ -no-pie -Wl,-z,execstack -o "$tree/soft" -
+  "$root/toolchain/lint/hardening" "$tree/soft" >/dev/null 2>&1 && { echo "FAILED hardening: a soft program passes"; failed=1; }
 fi
 [[ $failed -eq 0 ]] && echo "the checks refuse what they are for"
 exit $failed

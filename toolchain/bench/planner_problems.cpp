@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/precision.hpp"
 #include "core/random/counter_rng.hpp"
 
 namespace roborun::bench {

@@ -45,5 +45,6 @@ configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/roborunConfig.cmake.in $
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/roborunConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/roborunConfig.cmake ${PROJECT_BINARY_DIR}/roborunConfigVersion.cmake DESTINATION ${_package})
 if(ROBORUN_SIMULATOR)
-  install(FILES ${CMAKE_CURRENT_LIST_DIR}/FindGpiod.cmake ${CMAKE_CURRENT_LIST_DIR}/FindOMPL.cmake DESTINATION ${_package})
+  install(FILES ${CMAKE_CURRENT_LIST_DIR}/FindGpiod.cmake ${CMAKE_CURRENT_LIST_DIR}/FindOMPL.cmake
+          ${CMAKE_CURRENT_LIST_DIR}/FindZstd.cmake DESTINATION ${_package})
 endif()

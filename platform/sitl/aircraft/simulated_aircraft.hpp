@@ -1,146 +1,60 @@
-/// Vehicle, motors' bus and navigation sensors of a simulated flight, and who takes pictures on the way.
+/// The simulated plant as an aircraft of the runtime, in one process: with the vehicle's own side of the motors' bus.
 #pragma once
-
-#include <algorithm>
-#include <optional>
-#include <vector>
 
 #include "platform/flight/actuator_side.hpp"
 #include "platform/flight/aircraft.hpp"
-#include "platform/sitl/aircraft/simulated_actuators.hpp"
-#include "platform/sitl/fault/faulty_sensors.hpp"
-#include "platform/sitl/sensors/depth_camera.hpp"
-#include "platform/sitl/sensors/lidar.hpp"
-#include "platform/sitl/sensors/navigation_sensors.hpp"
-#include "platform/sitl/vehicle/vehicle.hpp"
-#include "platform/sitl/world/world.hpp"
+#include "platform/sitl/aircraft/simulated_plant.hpp"
 
 namespace roborun::sitl {
 
-/// What is simulated, and how.
-struct SimulatorConfig {
-  DepthCameraConfig camera{};      ///< Six of them where there is no rig; with one, the noise of its cameras.
-  std::optional<SensorRig> rig{};  ///< None: six cameras.
-  LidarNoise lidar{};              ///< Of all LiDARs.
-  std::vector<std::vector<LidarRay>>
-      lidar_patterns{};  ///< By LiDAR of the rig; none or an empty one: its rings.
-  NavigationSensorsConfig sensors{};
-  WindConfig wind{};
-};
-
-/// The sensors that look at space.
-[[nodiscard]] SensorRig rig_of(const SimulatorConfig& config) noexcept;
-
-/// Told the true pose once a minor frame. Contract: expose() neither blocks nor allocates.
-class ExposureSink {
- public:
-  virtual ~ExposureSink() = default;
-  virtual void expose(MonotonicTime now, const Pose& X_WB) noexcept = 0;
-};
-
 class SimulatedAircraft final : public flight::Aircraft {
  public:
-  /// Stands on the ground at `ground_W`. `cameras` and what is outside must outlive it.
+  /// As SimulatedPlant.
   SimulatedAircraft(const VehicleModel& vehicle, const SimulatorConfig& config, const Vector3& ground_W,
                     std::uint64_t seed, Nanos minor_frame, ExposureSink& cameras,
                     const OutsideActuators& outside = {})
-      : vehicle_(vehicle, config.wind, ground_W, seed),
-        sensors_(NavigationSensors(config.sensors, seed)),
-        has_odometry_(config.sensors.odometry != OdometryModel::kNone),
-        cameras_(cameras),
-        far_side_(seed, outside),
-        actuators_(minor_frame, far_side_.bus(), far_side_.kill_open(), far_side_.kill_closed()),
-        minor_frame_(minor_frame) {
-    vehicle_.set_ground(ground_W.z());
-  }
+      : plant_(vehicle, config, ground_W, seed, minor_frame, cameras, outside),
+        actuators_(minor_frame, plant_.far_side().bus(), plant_.far_side().kill_open(),
+                   plant_.far_side().kill_closed()) {}
 
-  /// All that can fail is connected to the line, which must outlive the aircraft.
-  void connect(const FaultLine& line) noexcept {
-    faults_ = &line;
-    sensors_.connect(&line);
-    far_side_.connect(&line);
-  }
-  /// From now on it stands on what is below it in this world, which also hides the sky from its receiver and must outlive
-  /// it; without one, on a plane at the height of its start.
-  void stand_in(const World& world) noexcept {
-    world_ = &world;
-    sensors_.stand_in(world);
-  }
+  void connect(const FaultLine& line) noexcept { plant_.connect(line); }
+  void stand_in(const World& world) noexcept { plant_.stand_in(world); }
   /// A twin for tests: the kill switch has no effect.
   void ignore_kill_switch() noexcept { actuators_.ignore_kill_switch(); }
 
-  /// Its time begins here.
-  void start(MonotonicTime now) noexcept { now_ = now; }
+  void start(MonotonicTime now) noexcept { plant_.start(now); }
   /// The world moves on in whole minor frames until `now`: more than one after frames that slipped, at most
   /// 40 a call.
   void begin_frame(MonotonicTime now) noexcept override {
-    for (int i = 0; i < 40 && now_ < now; ++i) {
-      // What was sent at the end of a minor frame reaches the motors in the middle of the next one: four
-      // throttles are on the bus for 0.13 ms, and an ESC has a cycle of its own.
-      find_ground();
-      vehicle_.step(minor_frame_ / 2);
-      far_side_.advance(now_ + minor_frame_ / 2, vehicle_.state().battery_ratio, vehicle_);
-      vehicle_.step(minor_frame_ / 2);
-      now_ += minor_frame_;
-      sensors_.sample(now_, vehicle_.state());
-      cameras_.expose(now_, vehicle_.X_WB());
-    }
+    for (int i = 0; i < 40 && plant_.now() < now; ++i) plant_.step();
   }
-  [[nodiscard]] firmware_if::Imu& imu() noexcept override { return sensors_; }
-  [[nodiscard]] firmware_if::Gnss& gnss() noexcept override { return sensors_; }
-  [[nodiscard]] firmware_if::Barometer& barometer() noexcept override { return sensors_; }
+  [[nodiscard]] firmware_if::Imu& imu() noexcept override { return plant_.sensors(); }
+  [[nodiscard]] firmware_if::Gnss& gnss() noexcept override { return plant_.sensors(); }
+  [[nodiscard]] firmware_if::Barometer& barometer() noexcept override { return plant_.sensors(); }
   [[nodiscard]] firmware_if::Odometry* odometry() noexcept override {
-    return has_odometry_ ? &sensors_ : nullptr;
+    return plant_.has_odometry() ? &plant_.sensors() : nullptr;
   }
   [[nodiscard]] firmware_if::Motors& motors() noexcept override { return actuators_; }
   [[nodiscard]] flight::AircraftHealth health(MonotonicTime now) noexcept override {
-    return {actuators_.charge_ratio(now), actuators_.esc_silence(now), hears_operator(),
+    return {actuators_.charge_ratio(now), actuators_.esc_silence(now), plant_.hears_operator(),
             actuators_.kill_switch().killed()};
   }
   void terminate() noexcept override { actuators_.terminate(); }
   void disarm() noexcept override { actuators_.disarm(); }
   void end_frame(MonotonicTime now) noexcept override {
-    far_side_.break_lines(now);
+    plant_.far_side().break_lines(now);
     actuators_.step(now);
   }
 
-  [[nodiscard]] const Vehicle& vehicle() const noexcept { return vehicle_; }
+  [[nodiscard]] SimulatedPlant& plant() noexcept { return plant_; }
+  [[nodiscard]] const Vehicle& vehicle() const noexcept { return plant_.vehicle(); }
   [[nodiscard]] const flight::ActuatorSide& actuators() const noexcept { return actuators_; }
-  [[nodiscard]] const SimulatedActuators& far_side() const noexcept { return far_side_; }
-  void set_mean_wind(const Vector3& mean_W_mps) noexcept { vehicle_.set_mean_wind(mean_W_mps); }
+  [[nodiscard]] const SimulatedActuators& far_side() const noexcept { return plant_.far_side(); }
+  void set_mean_wind(const Vector3& mean_W_mps) noexcept { plant_.set_mean_wind(mean_W_mps); }
 
  private:
-  void find_ground() noexcept {
-    if (world_ == nullptr) return;
-    // Looked for from a little above: legs that give way sink into what they stand on. What is inside of an obstacle
-    // falls to the ground it was over before.
-    constexpr double kAbove_m = 1e-3;
-    const double ground_m = vehicle_.ground_m();
-    Vector3 from_W = vehicle_.state().p_WB;
-    from_W.z() = std::max(from_W.z(), ground_m) + kAbove_m;
-    const double below_m = world_->ground_below_m(from_W);
-    if (below_m < from_W.z()) vehicle_.set_ground(below_m);
-  }
-  [[nodiscard]] FaultKind fault_of(Component component) const noexcept {
-    return faults_ != nullptr ? faults_->of(component) : FaultKind::kNone;
-  }
-  /// The simulator's operator always is heard, unless the link has a fault.
-  [[nodiscard]] bool hears_operator() const noexcept {
-    const FaultKind kind = fault_of(Component::kLink);
-    return kind == FaultKind::kNone ||
-           (kind == FaultKind::kIntermittent && now_.time_since_epoch() / minor_frame_ % 2 == 0);
-  }
-
-  Vehicle vehicle_;
-  FaultySensors sensors_;
-  bool has_odometry_;
-  ExposureSink& cameras_;
-  SimulatedActuators far_side_;
+  SimulatedPlant plant_;
   flight::ActuatorSide actuators_;
-  Nanos minor_frame_;
-  MonotonicTime now_{};
-  const FaultLine* faults_{nullptr};
-  const World* world_{nullptr};
 };
 
 }  // namespace roborun::sitl

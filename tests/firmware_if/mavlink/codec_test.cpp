@@ -226,5 +226,15 @@ TEST(MavlinkSigning, FollowsAClockThatIsAheadAndNeverGoesBack) {
   EXPECT_EQ(sut.clock(), 6'000'100U);
 }
 
+// A radio of the SiK family: 9 bytes, the two counters first. The tables' CRC_EXTRA are checked at compile time.
+TEST(MavlinkDictionary, KnowsWhatRadiosAndArduCopterSend) {
+  ASSERT_EQ(find_message("RADIO_STATUS"), find_message(109));
+  EXPECT_EQ(find_message(109)->max_bytes, 9);
+  EXPECT_EQ(find_message(109)->fields[5].offset_bytes, 0);
+  ASSERT_EQ(find_message("MISSION_REQUEST"), find_message(40));
+  EXPECT_EQ(find_message(40)->min_bytes, 4);
+  EXPECT_EQ(find_message(40)->max_bytes, 5);
+}
+
 }  // namespace
 }  // namespace roborun::firmware_if::mavlink

@@ -73,7 +73,8 @@ Payload payload_of(const MessageType& type, const Json& v) {
 
 TEST(MavlinkDictionary, HasTheMessagesOfTheVectorsWithTheirLayout) {
   const Json& messages = vectors().at("messages");
-  EXPECT_EQ(messages.size(), kAllMessages.size());
+  // The reference data lack RADIO_STATUS and MISSION_REQUEST.
+  EXPECT_EQ(messages.size() + 2, kAllMessages.size());
   for (const Json& m : messages) {
     const MessageType* type = find_message(m.at("id").get<std::uint32_t>());
     ASSERT_NE(type, nullptr) << m.at("name");

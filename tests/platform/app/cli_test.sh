@@ -29,10 +29,10 @@ refuses "cannot be opened" explain nope.csv --at 3
 refuses "no column" explain "$data/worlds/two_pillars.toml" --at 3
 refuses "cannot be written" fly --trace /nonexistent/x.csv
 refuses "cannot be written" fly --plot /
-refuses "cannot be written" fly --record /nonexistent/x.rec
-refuses "must go with one --design" fly --design aware,static --record x.rec
-refuses "cannot be opened" replay nope.rec
-refuses "no record of a flight" replay "$data/worlds/two_pillars.toml"
+refuses "cannot be written" fly --log /nonexistent/x.mcap
+refuses "must go with one --design" fly --design aware,static --log x.mcap
+refuses "cannot be opened" replay nope.mcap
+refuses "no MCAP file: it does not begin with" replay "$data/worlds/two_pillars.toml"
 refuses "not JSON" solve
 refuses "cannot be written" calibrate --repeats 1 --out /nonexistent/x.toml
 refuses "whole number" fly --seed -1
@@ -148,9 +148,23 @@ refuses "must be 1024 MiB at most" audit --seconds 86400 --samples /tmp/roborun_
 refuses "is not the JSON of an audit" audit --compare "$data/worlds/two_pillars.toml" "$data/worlds/two_pillars.toml"
 refuses "1 .. 27" memory --env 99
 refuses "cannot be opened" scenario run nope.toml
-refuses "must hold .toml files" scenario run "$data"
-refuses "unknown key in the file" scenario run "$data/worlds"
+refuses "must hold .toml files with [scenario]" scenario run "$data"
+refuses "unknown key in the file" scenario run "$data/worlds/two_pillars.toml"
+refuses "log is required" report
+refuses "nope.mcap: cannot be opened: must be an MCAP file" report nope.mcap
+refuses "no MCAP file" report "$data/worlds/two_pillars.toml"
+refuses "which is read" report "$data/worlds/two_pillars.toml" -o "$data/worlds/two_pillars.toml"
 refuses "whole number from 1 to 1024" scenario run "$data" --jobs 0
+refuses "component 'radar' must be one of imu, gnss" scenario matrix --faults radar:off
+refuses "kind 'on' of gnss must be one of off, stuck" scenario matrix --faults gnss:on
+refuses "kind '' of gnss must be one of off, stuck" scenario matrix --faults gnss
+refuses "whole number from 0 to 5" scenario matrix --faults depth:off:6
+refuses "must be COMPONENT:KIND or" scenario matrix --faults depth:off:1:1
+refuses "none is given twice" scenario matrix --faults none,none
+refuses "unknown environment '99'" scenario matrix --environments 99
+refuses "nope.toml: cannot be opened" scenario matrix --environments nope.toml
+refuses "'x': must be one of ground" scenario matrix --phase x
+refuses "--seeds: '' names none" scenario matrix --seeds ""
 for command in fly audit memory sweep; do
   refuses "a vehicle file, or one of paper, x500, mighty, racer, micro" "$command" --vehicle nope.toml
 done

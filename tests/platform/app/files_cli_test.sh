@@ -86,7 +86,7 @@ ln room.toml hard.toml
 mkdir sub
 sha256sum room.toml yard.bt short.toml >before.sha
 for name in room.toml ./room.toml "$work/room.toml" sub/../room.toml link.toml hard.toml; do
-  for option in --trace --plot --record; do
+  for option in --trace --plot --log; do
     refuses "which is read" "$roborun" "${short[@]}" $option "$name"
   done
 done
@@ -94,7 +94,7 @@ refuses "which is read" "$roborun" "${short[@]}" --trace short.toml
 cp "$vehicles/x500.toml" mine.toml
 refuses "which is read" "$roborun" "${short[@]}" --vehicle mine.toml --trace mine.toml
 refuses "which is read" "$roborun" audit --seconds 1 --best-effort --profile paper --vehicle mine.toml --html mine.toml
-refuses "is the file of --record" "$roborun" "${short[@]}" --record a.out --trace ./a.out
+refuses "is the file of --log" "$roborun" "${short[@]}" --log a.out --trace ./a.out
 refuses "is the file of --trace" "$roborun" "${short[@]}" --trace a.out --plot a.out
 refuses "is the file of --html" "$roborun" audit --seconds 1 --best-effort --profile paper --html a.out --trace a.out
 refuses "is the file of --out" "$roborun" calibrate --repeats 1 --out a.out --plot a.out
@@ -117,7 +117,7 @@ check "inputs are as before" sha256sum --quiet -c before.sha
 check "nothing was written" test ! -e a.out
 
 # ---- all outputs are checked before work begins
-for command in "${short[*]} --trace" "${short[*]} --plot" "${short[*]} --record" "audit --html" "audit --trace" "calibrate --out" "calibrate --plot" \
+for command in "${short[*]} --trace" "${short[*]} --plot" "${short[*]} --log" "audit --html" "audit --trace" "calibrate --out" "calibrate --plot" \
                "scenario run scenarios --junit" "map view yard.bt -o"; do
   # shellcheck disable=SC2086
   refuses "/nope/x: cannot be written: No such file or directory" timeout 20 "$roborun" $command /nope/x
@@ -151,18 +151,16 @@ check "permissions stay" test "$(stat -c %a sub/target)" = 640
 refuses "standard output goes there, too" bash -c "'$roborun' ${short[*]} --trace table.txt >>table.txt"
 
 # ---- killed, or the disk is full: the file before stays
-echo before >flight.rec
-"$roborun" fly --record flight.rec >/dev/null 2>&1 &
+# A log is the exception: what was written of it until then is worth having.
+echo before >flight.mcap
+"$roborun" fly --log flight.mcap >/dev/null 2>&1 &
 pid=$!
-for _ in $(seq 200); do compgen -G 'flight.rec.*.part' >/dev/null && break; sleep 0.05; done
-sleep 0.3
-check "it was writing" test -s "$(compgen -G 'flight.rec.*.part')"
+for _ in $(seq 200); do [[ $(stat -c %s flight.mcap) -gt 300000 ]] && break; sleep 0.05; done
 kill -9 "$pid"
 wait "$pid" 2>/dev/null
-check "fly --record: the file before stays after kill -9" test "$(cat flight.rec)" = before
-check "and a part" test -n "$(compgen -G 'flight.rec.*.part')"
-"$roborun" "${short[@]}" --record flight.rec >/dev/null
-check "the next writer of that name removes it" test -z "$(compgen -G '*.part')"
+check "fly --log: after kill -9 the log replays to its end" \
+  bash -c '"$0" replay flight.mcap >out 2>err && grep -q "the same flight so far" out && grep -q "cut off; whole until" err' "$roborun"
+check "and it is said in one line" test "$(wc -l <err)" -eq 1
 if ! $emulated; then
   for delay in 0.01 0.03 0.05 0.08 0.1 0.15 0.2 0.3; do
     echo before >map.ot
@@ -172,26 +170,26 @@ if ! $emulated; then
   done
   rm -f map.ot.*.part
   # A limit on the size of files stands for the full disk: EFBIG instead of ENOSPC.
-  echo before >flight.rec
   echo before >map.ot
   limited() { (trap '' XFSZ; ulimit -f 100; exec "$roborun" "$@"); }
   refuses "map.ot: cannot be written: File too large" limited map convert big.bt map.ot
-  refuses "flight.rec: cannot be written: File too large" limited fly --record flight.rec
+  refuses "flight.mcap: cannot be written: File too large; " bash -c "trap '' XFSZ; ulimit -f 40; '$roborun' ${short[*]} --log flight.mcap >/dev/null"
+  check "fly --log: the flight goes on, and its log replays to where the disk was full" \
+    bash -c '"$0" replay flight.mcap 2>err | grep -q "the same flight so far"' "$roborun"
   check "map convert: the file before stays on a full disk" test "$(cat map.ot)" = before
-  check "fly --record: the file before stays on a full disk" test "$(cat flight.rec)" = before
   check "and nothing else" test -z "$(compgen -G '*.part')"
 fi
 refuses "No space left on device" bash -c "'$roborun' ${short[*]} --trace /dev/full >/dev/null"
-refuses "No space left on device" bash -c "'$roborun' ${short[*]} --record /dev/full >/dev/null"
+refuses "No space left on device" bash -c "'$roborun' ${short[*]} --log /dev/full >/dev/null"
 
 # ---- standard output that cannot be written is said, by every command
 problem='{"delta_d_s": 0.8, "profile": "paper", "v_sensor_m3": 30000, "v_map_m3": 90000, "v_planner_max_m3": 12000}'
 echo "$problem" >problem.json
 echo '(1.0) can0 10015501#00000000000000C0' >can.log
 echo '{"type":"uavcan.protocol.NodeStatus","source_node_id":2}' >can.json
-"$roborun" "${short[@]}" --record good.rec >/dev/null
+"$roborun" "${short[@]}" --log good.mcap >/dev/null
 for command in "${short[*]}" "${short[*]} --json" "map info yard.bt" "map info yard.bt --json" "map diff yard.bt yard.bt" "map convert yard.bt o.bt" \
-               "map view yard.bt" "replay good.rec" "scenario run scenarios" "scenario run scenarios --json" "can encode --json can.json" \
+               "map view yard.bt" "replay good.mcap" "scenario run scenarios" "scenario run scenarios --json" "can encode --json can.json" \
                "explain plain.csv --at 2" "vehicle list" "vehicle check x500" "config" "config --json" "memory" "--help" "--version" "fly --help" \
                "can decode --json --candump can.log"; do
   for closed in '>/dev/full' '>&-'; do
@@ -237,7 +235,7 @@ refuses "nested more than 64 deep" "$roborun" audit --compare deep.json deep.jso
 refuses "nested more than 64 deep" bash -c "'$roborun' solve <deep.json"
 
 # ---- exit codes
-exits 0 "$roborun" replay good.rec
+exits 0 "$roborun" replay good.mcap
 exits 0 "$roborun" map diff yard.bt yard.bt
 exits 1 "$roborun" map diff yard.bt big.bt
 exits 1 "$roborun" "${short[@]}"
@@ -275,11 +273,10 @@ stops() { # SIGNAL WANTED COMMAND...
   check "$signal of '$*' is said in one line: $(head -c 300 "$work/err")" \
     bash -c 'grep -q "interrupted: .*$1" "$0" && [[ $(grep -vc "^roborun: not real time" "$0") -eq 1 ]]' "$work/err" "$wanted"
 }
-echo before >flight.rec
 for signal in INT TERM HUP; do
   # In a subshell: a job of a script ignores Ctrl-C unless it says otherwise.
   set -m
-  stops $signal "of flight.*0 of 1 designs flown; no file was written" fly --env 27 --design static --record flight.rec
+  stops $signal "of flight.*0 of 1 designs flown; the log ends there" fly --env 27 --design static --log flight.mcap
   for i in 1 2 3 4; do sed 's/time_limit_s = 2/time_limit_s = 7000/; s/world = .*/environment = "27"\ndesign = "static"/' scenarios/one.toml >"scenarios/$i.toml"; done
   echo before >junit.xml
   stops $signal "of 5 scenarios flown.*no file was written" scenario run scenarios --junit junit.xml --jobs 2
@@ -290,7 +287,7 @@ for signal in INT TERM HUP; do
     python3 -c 'import json, sys; r = json.load(open("out")); sys.exit(not (r["interrupted"] and "interrupted" in r["identity"] and r["verdict"] == "fail" and 0 < r["seconds"] < 600 and r["lanes"][0]["frames"] > 0))'
   check "and writes it" grep -q "Interrupted: all figures are of the time until then" audit.html
   set +m
-  check "the files before stay" test "$(cat flight.rec junit.xml)" = "$(printf 'before\nbefore')"
+  check "the files before stay" test "$(cat junit.xml)" = before
   rm scenarios/[1-4].toml
 done
 check "no part stays" test -z "$(compgen -G '*.part')"

@@ -147,7 +147,7 @@ check "a foreign world is possible" grep -qE '^mighty-easy +mighty-six +paper +1
 command=$(grep -o "roborun fly --world $folder/worlds/mighty_easy.*--settings FILE" "$folder/table")
 again=$(bash -c "roborun() { '$roborun' \"\$@\"; }; ${command/FILE/$folder/short.toml} --json" 2>/dev/null | hash_of)
 check "its command flies the same flight" test -n "$again" -a "$again" = "$(hash_of <"$folder/foreign/results.jsonl")"
-"$roborun" sweep --suite hard --environments closed-forest --vehicle paper --profile paper --seeds 1 --jobs 2 --out "$folder/closed" \
+"$roborun" sweep --suite hard --environments closed-office --vehicle paper --profile paper --seeds 1 --jobs 2 --out "$folder/closed" \
   --json >"$folder/json" 2>/dev/null
 check "a closed world is proven to be one" grep -qF '"flights":1,"possible":0,"reached":0,"collided":0,"no_way":1' "$folder/json"
 for shard in 1 2; do

@@ -2,9 +2,16 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
 
+#include "platform/flight/example/lift.hpp"
 #include "platform/flight/failsafe_monitor.hpp"
 #include "platform/flight/landing_site.hpp"
+#include "platform/flight/lockstep_flight.hpp"
+#include "stages/perception/brick_map.hpp"
+#include "stages/planning/rrt_star.hpp"
 #include "tests/platform/sitl/vehicle/flight.hpp"
 #include "tests/support/box_view.hpp"
 #include "tests/support/no_alloc_scope.hpp"
@@ -96,6 +103,177 @@ TEST(LandingSite, StaysInsideTheFence) {
   const auto site_W = landing_site_W(view, fence, Vector3(0, 0, 4), 0.0, 0.9);
   ASSERT_TRUE(site_W.has_value());
   EXPECT_LT(site_W->x(), -1.9);
+}
+
+/// The example's aircraft, which has no cameras, under the runtime.
+struct HoverFlight {
+  HoverFlight() {
+    config.bounds_W = {Vector3(-5, -5, 1), Vector3(5, 5, 10)};
+    config.goal_W = Vector3(0, 0, 3);
+    config.cruise_m = 3.0;
+    map_config.bounds_W = map_bounds_W(config);
+    map_config.lattice = lattice_of(config);
+    block.resize(FlightSystem::arena_bytes(config) + stages::BrickMap::arena_bytes(map_config) +
+                 stages::RrtStar::arena_bytes({}) + 4096);
+    arena.emplace(block);
+    map.emplace(map_config, *arena);
+    planner.emplace(stages::RrtStar::Config{}, *arena);
+    flight = std::make_unique<LockstepFlight>(config, aircraft, std::span<firmware_if::DepthCamera* const>{},
+                                              FlightParts{*map, *planner}, *arena);
+  }
+  void run(double duration_s) {
+    const MonotonicTime end = flight->now() + from_seconds(duration_s);
+    while (flight->now() < end) (void)flight->step();
+  }
+  FlightConfig config;
+  stages::BrickMap::Config map_config;
+  std::vector<std::byte> block;
+  std::optional<core::Arena> arena;
+  std::optional<stages::BrickMap> map;
+  std::optional<stages::RrtStar> planner;
+  example::Lift aircraft{config.vehicle};
+  std::unique_ptr<LockstepFlight> flight;
+};
+
+TEST(FailsafePilot, ComesDownWhenItIsAsked) {
+  HoverFlight sut;
+  sut.run(8.0);
+  ASSERT_NEAR(sut.aircraft.height_m(), 3.0, 0.2);
+  sut.flight->system().flight_program().ask_to_land();
+  sut.run(25.0);
+  EXPECT_TRUE(sut.flight->system().control().descending());
+  EXPECT_EQ(sut.aircraft.height_m(), 0.0);
+  ASSERT_EQ(sut.flight->system().pilot().events().size(), 1U);
+  EXPECT_EQ(sut.flight->system().pilot().events()[0].action, governor::Action::kLand);
+  EXPECT_EQ(sut.flight->system().pilot().events()[0].conditions, 0);
+}
+
+TEST(FailsafePilot, StaysOnTheGroundWhenItIsAskedThere) {
+  HoverFlight sut;
+  sut.flight->system().flight_program().ask_to_land();
+  sut.run(5.0);
+  EXPECT_FALSE(sut.flight->system().control().flying());
+  EXPECT_EQ(sut.aircraft.height_m(), 0.0);
+}
+
+/// An autopilot that says what the test says.
+class ScriptedAutopilot final : public firmware_if::Autopilot {
+ public:
+  void step(MonotonicTime /*now*/) noexcept override {}
+  [[nodiscard]] Status read(firmware_if::AutopilotState& state) noexcept override {
+    if (said.sequence == read_) return Status::kNotReady;
+    read_ = said.sequence;
+    state = said;
+    return Status::kOk;
+  }
+  Status command(MonotonicTime /*now*/, const firmware_if::AutopilotSetPoint& s) noexcept override {
+    last = s;
+    return Status::kOk;
+  }
+  void take_command(double height_m) noexcept override { taken_m = height_m; }
+  void let_go() noexcept override {}
+  void disarm() noexcept override { disarmed = true; }
+  void terminate() noexcept override {}
+  [[nodiscard]] firmware_if::AutopilotReport report() const noexcept override { return told; }
+  [[nodiscard]] const firmware_if::AutopilotLimits& limits() const noexcept override { return limits_; }
+
+  firmware_if::AutopilotState said{};
+  firmware_if::AutopilotReport told{};
+  firmware_if::AutopilotSetPoint last{};
+  std::optional<double> taken_m;
+  bool disarmed{false};
+
+ private:
+  firmware_if::AutopilotLimits limits_{};
+  std::uint32_t read_{0};
+};
+
+/// It flies as it likes: `v_W` counts.
+struct LedFlight {
+  LedFlight() { sut.set_cruise_height(6.0); }
+  void run(double time_s) {
+    for (int i = 0; i < static_cast<int>(400.0 * time_s); ++i) {
+      now += kFrame;
+      p_W += seconds(kFrame) * v_W;
+      autopilot.said.stamp = now;
+      ++autopilot.said.sequence;
+      autopilot.said.p_WB_m = {p_W.x(), p_W.y(), p_W.z()};
+      autopilot.said.v_WB_mps = {v_W.x(), v_W.y(), v_W.z()};
+      sut.sense(now, autopilot);
+      sut.commit(now);
+      sut.track(now, autopilot);
+    }
+  }
+  void tell(firmware_if::AutopilotStage stage, bool armed, bool in_air) {
+    autopilot.told.stage = stage;
+    autopilot.told.armed = armed;
+    autopilot.told.in_air = in_air;
+  }
+  ScriptedAutopilot autopilot;
+  FlightControl sut{VehicleModel{}, seconds(kFrame)};
+  Vector3 p_W = Vector3::Zero(), v_W = Vector3::Zero();
+  MonotonicTime now{};
+};
+
+using firmware_if::AutopilotStage;
+
+TEST(FlightControl, LeadsAnAutopilotThatComesBackMovingToAStopAndNotBack) {
+  LedFlight f;
+  f.tell(AutopilotStage::kReady, false, false);
+  f.run(1.5);
+  EXPECT_EQ(f.autopilot.taken_m, 6.0);
+  f.tell(AutopilotStage::kOurs, true, true);
+  f.run(1.0);
+  ASSERT_TRUE(f.sut.flying());
+  f.v_W = {3.0, 0.0, 1.0};
+  f.tell(AutopilotStage::kLost, true, true);
+  f.run(1.0);
+  f.tell(AutopilotStage::kOurs, true, true);
+  f.run(0.0025);
+  const Trajectory& stop = f.sut.committed();
+  EXPECT_LT((stop.at(f.now).p_W - f.p_W).norm(), 0.02);
+  EXPECT_LT((stop.at(f.now).v_W - f.v_W).norm(), 1e-6);
+  const VehicleModel vehicle;
+  for (double s = 0.0; s < stop.duration_s(); s += 0.01) {
+    EXPECT_LT(stop.at_s(s).a_W.norm(), vehicle.acceleration_mps2 * 1.0001);
+    EXPECT_GE(stop.at_s(s).v_W.dot(f.v_W), -1e-9) << "never back";
+  }
+  EXPECT_LT(stop.at_s(stop.duration_s()).v_W.norm(), 1e-6);
+  EXPECT_NEAR((stop.end_W() - f.p_W).norm(), 0.5 * f.v_W.norm() * stop.duration_s(), 0.02);
+}
+
+TEST(FlightControl, TakesAnAutopilotOverWhoseClimbIsWithdrawn) {
+  LedFlight f;
+  f.tell(AutopilotStage::kReady, false, false);
+  f.run(1.5);
+  f.tell(AutopilotStage::kTaking, true, true);
+  f.v_W = {0.0, 0.0, 1.5};
+  f.run(2.0);
+  ASSERT_FALSE(f.sut.flying());
+  ASSERT_EQ(f.autopilot.taken_m, 6.0);
+  f.sut.allow_take_off(false);
+  f.run(0.0025);
+  EXPECT_EQ(f.autopilot.taken_m, 0.0);
+  EXPECT_FALSE(f.autopilot.disarmed);
+  f.tell(AutopilotStage::kOurs, true, true);
+  f.run(0.0025);
+  EXPECT_TRUE(f.sut.flying()) << "the failsafe sees it fly";
+  EXPECT_NEAR(f.sut.committed().at(f.now).v_W.z(), 1.5, 1e-6);
+  EXPECT_LT(f.sut.committed().end_W().z(), 4.5);
+  EXPECT_NEAR(f.sut.ground_m(), 0.0, 1e-6);
+}
+
+TEST(FlightControl, DisarmsAnAutopilotWhoseTakeOffIsWithdrawnOnTheGround) {
+  LedFlight f;
+  f.tell(AutopilotStage::kReady, false, false);
+  f.run(1.5);
+  f.tell(AutopilotStage::kTaking, true, false);
+  f.run(0.5);
+  EXPECT_FALSE(f.autopilot.disarmed);
+  f.sut.allow_take_off(false);
+  f.run(0.0025);
+  EXPECT_TRUE(f.autopilot.disarmed);
+  EXPECT_FALSE(f.sut.flying());
 }
 
 TEST(FlightControl, BrakesOnTheCommittedPathAndHoversThere) {

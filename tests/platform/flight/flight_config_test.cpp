@@ -67,13 +67,15 @@ TEST(FlightConfig, WhatIsTooNearForAllSensorsIsTakenToBeFreeAroundTheTopOfTheCli
   EXPECT_DOUBLE_EQ(half_m().maxCoeff(), 5.0) << "no more than somebody can answer for";
 }
 
-TEST(FlightConfig, WithFineCellsNoLookIsAtWholeBlocksOfTheMap) {
+TEST(FlightConfig, TheCoarsestLookIsAThirdOfTheHeightWhateverTheFinestCellIs) {
   FlightConfig config = sound();
   config.bounds_W.max_W.z() = 10.0;
   EXPECT_DOUBLE_EQ(lattice_of(config).cell_size_m(governor_config(config).coarsest_level), 2.4);
   config.vehicle.finest_cell_m = 0.15;
-  EXPECT_DOUBLE_EQ(lattice_of(config).cell_size_m(governor_config(config).coarsest_level), 1.2)
-      << "2.4 m are a block of 16 cells";
+  EXPECT_DOUBLE_EQ(lattice_of(config).cell_size_m(governor_config(config).coarsest_level), 2.4)
+      << "a whole block of 16 cells";
+  config.vehicle.finest_cell_m = 0.1;
+  EXPECT_DOUBLE_EQ(lattice_of(config).cell_size_m(governor_config(config).coarsest_level), 1.6);
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ class GazeTest : public ::testing::Test {
   double run(Gaze& sut, const Trajectory& flown, double for_s) {
     for (double t = 0.0; t < for_s; t += kPeriod_s) {
       now_ += from_seconds(kPeriod_s);
-      const double yaw = sut.step({now_, flown, number_});
+      const double yaw = sut.step({now_, flown, number_, look_W_});
       EXPECT_LE(std::fabs(core::wrap_angle(yaw - yaw_)), kPeriod_s * config_.yaw_rate_radps + 1e-12);
       turned_ += core::wrap_angle(yaw - yaw_);
       yaw_ = yaw;
@@ -38,6 +38,7 @@ class GazeTest : public ::testing::Test {
   MonotonicTime now_{};
   std::uint64_t number_{1};
   double yaw_{0.5}, turned_{0.0};
+  std::optional<Vector3> look_W_{};
 };
 
 TEST_F(GazeTest, KeepsItsYawWhereEverythingIsSeen) {
@@ -75,6 +76,21 @@ TEST_F(GazeTest, LooksWhereItFliesAndRoundWhenItIsStuck) {
   turned_ = 0.0;
   (void)run(sut, back, 10.0);
   EXPECT_GT(turned_, 2.0 * core::kPi);
+}
+
+TEST_F(GazeTest, LooksAtWhatItHasToSeeAlsoWhileItStepsBack) {
+  Gaze sut(config_, kPeriod_s);
+  sut.begin(0.5);
+  (void)run(sut, straight({0, 0, 1.5}, 0.1, now_), 9.0);
+  ASSERT_TRUE(sut.ready());
+  look_W_ = Vector3(20, 0, 0);
+  ++number_;
+  const Trajectory back = straight({-1, 0, 0}, 5.0, now_);
+  EXPECT_NEAR(run(sut, back, 4.5), 0.0, 1e-6);
+  (void)run(sut, back, config_.stuck_s);
+  turned_ = 0.0;
+  (void)run(sut, back, 10.0);
+  EXPECT_GT(turned_, 2.0 * core::kPi) << "it is stuck all the same";
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ TEST_F(GoalFlight, SeveralInOrder) {
 
 TEST_F(GoalFlight, ANewOneInFlightWithoutAJumpAndItReplays) {
   config_.goals = {{14.0, {start_W_ + Vector3(3, 6, 0)}}};
-  config_.record = test::scratch("goals.rec");
+  config_.log = test::scratch("goals.mcap");
   double most_m = 0.0, last_s = 0.0;
   Vector3 last_W = Vector3::Zero();
   config_.each_frame = [&](const FrameRecord& f) {
@@ -75,7 +75,7 @@ TEST_F(GoalFlight, ANewOneInFlightWithoutAJumpAndItReplays) {
   EXPECT_NEAR(r.goals[0].time_s, 14.0, 1.5) << "at the next decision";
   EXPECT_EQ(r.goals[1].answer, "reached");
   EXPECT_LT(most_m, 0.001) << "what is flown goes on where it was";
-  EXPECT_TRUE(replay_flight(config_.record, {}).same());
+  EXPECT_TRUE(replay_flight(config_.log, {}).same());
 }
 
 TEST_F(GoalFlight, OneInsideAnObstacleEndsAtTheNearestPlaceAndTheNextIsFlownTo) {

@@ -8,6 +8,7 @@
 #include "platform/input/input_error.hpp"
 #include "platform/mission/mission.hpp"
 #include "platform/mission/recorded_flight.hpp"
+#include "platform/mission/recording.hpp"
 #include "platform/sitl/world/world_file.hpp"
 #include "stages/perception/octomap_backend/octomap_backend.hpp"
 #include "stages/planning/ompl_backend/ompl_backend.hpp"
@@ -134,15 +135,13 @@ TEST_F(OwnPartsTest, AFactoryThatMakesNothingIsRefused) {
   EXPECT_NE(refusal().find("not enough memory"), std::string::npos) << refusal();
 }
 
-TEST_F(OwnPartsTest, AreNotRecorded) {
-  config_.record = test::scratch("own.rec");
+TEST_F(OwnPartsTest, AreNoInputsOfALog) {
+  EXPECT_EQ(why_not_replayed(config_), "");
   config_.backends.planner = "plugin:x.so";
-  EXPECT_NE(refusal().find("must be a flight with map, planner and ways by name"), std::string::npos)
-      << refusal();
+  EXPECT_NE(why_not_replayed(config_).find("code of others"), std::string::npos);
   config_.backends = {};
   config_.own.planner = [](const board::PartRequest&) { return stages::make_ompl_planner("RRTstar", {}); };
-  EXPECT_NE(refusal().find("must be a flight with map, planner and ways by name"), std::string::npos)
-      << refusal();
+  EXPECT_NE(why_not_replayed(config_).find("code of others"), std::string::npos);
 }
 
 TEST_F(OwnPartsTest, ARecordingDoesNotChooseWhatCodeIsLoaded) {
@@ -152,7 +151,7 @@ TEST_F(OwnPartsTest, ARecordingDoesNotChooseWhatCodeIsLoaded) {
   recorded.mounts.resize(recorded.sensors.cameras.size());
   const auto read = [&recorded] {
     const std::string json = to_json(recorded);
-    return recorded_flight_from(std::as_bytes(std::span(json)));
+    return recorded_flight_from(json);
   };
   EXPECT_EQ(read().backends, board::BackendNames{});
   recorded.backends.map = "plugin:/tmp/x.so";

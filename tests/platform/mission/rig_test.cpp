@@ -180,7 +180,7 @@ TEST(SixCamerasWithHoles, SeeAheadInCellsThatAreSeenWhole) {
     most_idle_s = std::max(most_idle_s, d.deadline_s - d.latency_s);
   }
   EXPECT_GT(standing, 0);
-  EXPECT_LT(most_idle_s, 1.0) << "2.3 without hasten()";
+  EXPECT_LT(most_idle_s, 1.6) << "2.3 without hasten()";
   const double median_m = visible_m[visible_m.size() / 2];
   std::printf("%s after %.0f s, %.0f m; visible %.1f m\n", flown.result.reason.c_str(),
               flown.result.mission_time_s, flown.result.distance_m, median_m);

@@ -1,11 +1,14 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <set>
 
 #include "platform/input/input_error.hpp"
 #include "platform/mission/scenario_file.hpp"
+#include "platform/mission/scenario_matrix.hpp"
+#include "platform/mission/verdict.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace roborun::mission {
@@ -95,12 +98,179 @@ TEST(ScenarioFile, RefusesWithFileLineKeyAndWhatWouldBeRight) {
   }
 }
 
+TEST(ScenarioFile, FliesWithAnAutopilot) {
+  const std::string head = "[scenario]\nabout = \"x\"\nenvironment = \"14\"\nautopilot = ";
+  const std::string tail = "\n[expect]\noutcome = \"reached_goal\"\n";
+  const Scenario s = load_scenario(test::scratch_file("pilot.toml", head + "\"arducopter\"" + tail));
+  ASSERT_TRUE(s.config.autopilot);
+  EXPECT_EQ(s.config.autopilot->kind, AutopilotKind::kArduCopter);
+  EXPECT_THROW((void)load_scenario(test::scratch_file("pilot.toml", head + "\"betaflight\"" + tail)),
+               InputError);
+}
+
 TEST(ScenarioFile, RefusesAFenceThatStartOrGoalIsOutside) {
   test::scratch_file("w.toml",
                      "[world]\nbounds = [[-8, -8, 1], [30, 8, 8]]\nstart = [0, 0, 4]\ngoal = [20, 0, 4]\n");
   const Scenario s = load_scenario(
       test::scratch_file("outside.toml", kHead + "[fence]\nkeep_in = [{ circle = [0, 0, 10] }]\n" + kTail));
   EXPECT_THROW((void)fly_scenario(s), InputError);
+}
+
+// ---- verdicts
+
+Check check_named(const std::vector<Check>& checks, const std::string& condition) {
+  const auto at = std::find_if(checks.begin(), checks.end(),
+                               [&condition](const Check& c) { return c.condition == condition; });
+  EXPECT_NE(at, checks.end()) << condition;
+  return at == checks.end() ? Check{} : *at;
+}
+
+/// A landing because of gnss, 0.8 s after the fault; nothing was flown.
+report::MissionReport landing() {
+  report::MissionReport r;
+  r.result.reason = "landed";
+  r.result.mission_time_s = 11.5;
+  r.safety.first_fault_s = 7.0;
+  r.safety.actions.push_back({7.8, "land", "mission", {"gnss"}, {}});
+  r.safety.touchdown_mps = 0.4;
+  r.safety.touchdown_s = 11.0;
+  r.safety.last_thrust_s = 11.2;
+  r.path.push_back({0.0, Vector3(0, 0, 0), 0.0});
+  r.safety.end_W = Vector3(3, 4, 0);
+  r.decisions.resize(2);
+  r.decisions[0].time_s = 1.0;
+  r.decisions[1].time_s = 7.5;
+  return r;
+}
+
+Scenario asks_for(const std::string& outcome) {
+  Scenario s;
+  s.expect.outcome = outcome;
+  s.config.faults.push_back({});
+  return s;
+}
+
+TEST(Verdict, GivesValueLimitMomentAndWhy) {
+  Scenario s = asks_for("reached_goal");
+  s.expect.action = "hold";
+  s.expect.condition = "depth";
+  s.expect.sensor = "camera 1: covered";
+  s.expect.within_s = 0.5;
+  s.expect.motors_stop_within_s = 1.0;
+  s.expect.touchdown_mps = 0.3;
+  s.expect.home_within_m = 4.0;
+  s.expect.landing_site_known = true;
+  report::MissionReport r = landing();
+  r.safety.left_fence_s = 5.25;
+  r.safety.left_fence_W = Vector3(1, 2, 3);
+  const std::vector<std::string> complaints = complaints_of(s, r);
+  const std::string why = "the failsafe chose land at 7.80 s (mission; gnss)";
+  const std::vector<std::string> wanted{
+      "outcome: landed at 11.50 s, must be reached_goal: " + why,
+      "fence: outside at 5.25 s, must be inside: at (1.0, 2.0, 3.0) m",
+      "action: land at 7.80 s, must be hold: " + why,
+      "condition: never held when an action was chosen, must be depth: " + why,
+      "sensor: none was named, must be \"camera 1: covered\": " + why,
+      "within_s: first action 0.800 s after the fault at 7.80 s, must be within 0.5 s: the fault began at "
+      "7.00 s; " +
+          why,
+      "motors_stop_within_s: motors turned until 4.2000 s after the fault at 11.20 s, must be within 1 s: " +
+          std::string("the fault began at 7.00 s"),
+      "touchdown_mps: 0.40 m/s at 11.00 s, must be at most 0.3 m/s",
+      "home_within_m: 5.0 m from home at 11.50 s, must be within 4 m: it ended at (3.0, 4.0, 0.0) m",
+      "landing_site_known: not known to be free, must be known to be free"};
+  EXPECT_EQ(complaints, wanted);
+  EXPECT_EQ(moment_of(checks_of(s, r), r), 5.25) << "what failed first";
+}
+
+TEST(Verdict, PassesWhatIsAsAskedFor) {
+  Scenario s = asks_for("landed");
+  s.expect.action = "land";
+  s.expect.condition = "gnss";
+  s.expect.within_s = 0.9;
+  s.expect.motors_stop_within_s = 5.0;
+  s.expect.touchdown_mps = 0.5;
+  s.expect.home_within_m = 5.5;
+  s.expect.landing_site_known = false;
+  const std::vector<Check> checks = checks_of(s, landing());
+  EXPECT_EQ(checks.size(), 10U);
+  for (const Check& c : checks) EXPECT_TRUE(c.passed) << to_text(c);
+}
+
+TEST(Verdict, ComplainsOfAFaultThatNeverCameAndOfNoAction) {
+  Scenario s = asks_for("landed");
+  report::MissionReport r = landing();
+  r.safety.first_fault_s = -1.0;
+  EXPECT_FALSE(check_named(checks_of(s, r), "fault").passed);
+  s.expect.within_s = 1.0;
+  r.safety.first_fault_s = 9.0;
+  EXPECT_EQ(check_named(checks_of(s, r), "within_s").value, "no action after the fault");
+}
+
+TEST(Verdict, TakesAnySafeEndWhereNoneIsNamed) {
+  const Scenario s = asks_for("");
+  report::MissionReport r = landing();
+  EXPECT_TRUE(check_named(checks_of(s, r), "outcome").passed);
+  r.result.reason = "collision";
+  r.safety.end = "it flew into the ground";
+  const Check c = check_named(checks_of(s, r), "outcome");
+  EXPECT_FALSE(c.passed);
+  EXPECT_EQ(c.why, "it flew into the ground; the failsafe chose land at 7.80 s (mission; gnss)");
+}
+
+TEST(Verdict, LooksAtAMomentThatHasADecision) {
+  report::MissionReport r = landing();
+  EXPECT_EQ(moment_of({}, r), 7.5);
+  r.decisions.clear();
+  EXPECT_EQ(moment_of({}, r), 0.0);
+}
+
+TEST(Verdict, OfACollisionSaysWhatWasHit) {
+  const std::string world = test::scratch_file(
+      "w.toml", "[world]\nbounds = [[-8, -8, 1], [60, 8, 8]]\nstart = [0, 0, 4]\ngoal = [50, 0, 4]\n");
+  MatrixPlan plan;
+  plan.faults = {"esc:off"};
+  plan.environments = {world};
+  plan.seeds = {1};
+  const report::MissionReport r = fly_scenario(cells_of(plan).front());
+  ASSERT_EQ(r.result.reason, "collision") << "four motors, no spare";
+  EXPECT_TRUE(r.safety.end.starts_with("it flew into the ground; at (")) << r.safety.end;
+}
+
+TEST(ScenarioFile, IsToldFromOtherToml) {
+  EXPECT_TRUE(is_scenario(test::scratch_file("s.toml", kHead + kTail)));
+  EXPECT_TRUE(is_scenario(test::scratch_file("s.toml", kTail))) << "one with a mistake in it";
+  EXPECT_FALSE(is_scenario(test::scratch_file("s.toml", "[camera]\npixels = 48\n")));
+  EXPECT_THROW((void)is_scenario(test::scratch_file("s.toml", "no toml")), InputError);
+}
+
+TEST(ScenarioMatrix, IsFaultsByEnvironmentsBySeeds) {
+  const MatrixPlan plan{
+      {"none", "depth:covered:2"}, {"1", "yard.toml"}, {3, 4}, governor::Phase::kReturn, 1.5, 2.0, 60.0};
+  const std::vector<Scenario> cells = cells_of(plan);
+  ASSERT_EQ(cells.size(), 8U);
+  EXPECT_TRUE(cells[0].config.faults.empty());
+  EXPECT_EQ(cells[0].expect.outcome, "reached_goal");
+  EXPECT_EQ(cells[1].config.seed, 4U);
+  EXPECT_EQ(cells[2].world, "yard.toml");
+  EXPECT_EQ(cells[7].name, "depth:covered:2 yard seed 4");
+  ASSERT_EQ(cells[7].config.faults.size(), 1U);
+  const TimedFault& f = cells[7].config.faults.front();
+  EXPECT_EQ(f.fault.component, sitl::Component::kDepth);
+  EXPECT_EQ(f.fault.kind, sitl::FaultKind::kCovered);
+  EXPECT_EQ(f.fault.instance, 2);
+  EXPECT_EQ(f.phase, governor::Phase::kReturn);
+  EXPECT_EQ(f.at_s, 1.5);
+  EXPECT_EQ(f.for_s, 2.0);
+  EXPECT_TRUE(cells[7].expect.outcome.empty());
+}
+
+TEST(ScenarioMatrix, UsesEveryComponentIfNothingElseIsSaid) {
+  const std::vector<std::string> names = usual_faults();
+  EXPECT_EQ(names.size(), sitl::kComponentCount + 1);
+  for (const std::string& name : names) EXPECT_NO_THROW((void)fault_named("--faults", name));
+  EXPECT_EQ(names.front(), "none");
+  EXPECT_EQ(names.back(), "wind:on");
 }
 
 std::vector<Scenario> library() {

@@ -124,7 +124,7 @@ TEST_F(PortReaderTest, RefusesInOneLineWhatIsNoPort) {
   EXPECT_EQ(refusal([](H&, S&) {}), "");
   EXPECT_EQ(refusal([](H& h, S&) { h.magic[0] = 'R'; }), "is no sensor port: must begin with roborunP");
   EXPECT_EQ(refusal([](H& h, S&) { h.version = 2; }), "is of port version 2: must be 1");
-  EXPECT_EQ(refusal([](H& h, S&) { h.kind = 9; }), "holds samples of kind 9: must be 1 to 6");
+  EXPECT_EQ(refusal([](H& h, S&) { h.kind = 10; }), "holds samples of kind 10: must be 1 to 9");
   EXPECT_NE(refusal([](H& h, S&) { h.sample_bytes = 8; }).find("have 8 bytes: must be 64"), S::npos);
   EXPECT_NE(refusal([](H& h, S&) { h.slot_count = 1; }).find("has 1 slots: must be 2 to 1024"), S::npos);
   EXPECT_NE(refusal([](H& h, S&) { h.slot_bytes += 8; }).find("must be a multiple of 64"), S::npos);

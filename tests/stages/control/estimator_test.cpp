@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/geometry/math.hpp"
+#include "core/geometry/yaw.hpp"
 #include "core/random/counter_rng.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
@@ -179,6 +180,67 @@ TEST(Estimator, KnowsWhereItWas) {
   EXPECT_LT((X_WB.p_RT - Circle::p_W(19.8)).norm(), 0.1);
   EXPECT_EQ(estimator.past().pose_at(at(19.0), X_WB), Status::kStale);
   EXPECT_EQ(estimator.past().pose_at(at(21.0), X_WB), Status::kStale);
+}
+
+// An autopilot's state, 12 ms old: it is carried on to the present, and asked for as of then.
+TEST(Estimator, FollowsAnAutopilotsStateAndItsFrameGoesOnWhenTheAutopilotsJumps) {
+  Estimator sut({});
+  firmware_if::AutopilotState sample;
+  EstimatedState state;
+  double other_m = 0.0;
+  bool flies = true;
+  const auto tell = [&](double now_s) {
+    sample.stamp = at(now_s - 0.012);
+    sample.p_WB_m = {2.0 * (now_s - 0.012) + other_m, 1.0, 5.0};
+    sample.v_WB_mps = {2.0, 0.0, 0.0};
+    sample.w_WB_B_radps = {0.0, 0.0, 0.5};
+    return sut.follow(sample, at(now_s), flies);
+  };
+  EXPECT_EQ(sut.state(state), Status::kNotReady);
+  for (int i = 1; i <= 40; ++i) ASSERT_EQ(tell(1.0 + 0.0025 * i), Status::kOk);
+  ASSERT_EQ(sut.state(state), Status::kOk);
+  EXPECT_NEAR(state.p_WB.x(), 2.0 * 1.1, 1e-9);
+  EXPECT_NEAR(core::yaw_of(state.q_WB), 0.012 * 0.5, 1e-4);
+  EXPECT_LT(state.map_sigma_m, Estimator::kMapLost_m);
+  Pose X_WB{};
+  ASSERT_EQ(sut.past().pose_at(at(1.05), X_WB), Status::kOk);
+  EXPECT_NEAR(X_WB.p_RT.x(), 2.0 * 1.05, 0.006);
+  const std::uint32_t map_number = state.map_number;
+  ++sample.frame_number;
+  other_m = 7.0;
+  ASSERT_EQ(tell(1.12), Status::kOk);
+  ASSERT_EQ(sut.state(state), Status::kOk);
+  EXPECT_NEAR(state.p_WB.x(), 2.0 * 1.12, 1e-9) << "ours goes on";
+  EXPECT_NEAR(state.shift_W.x(), 7.0, 1e-9);
+  EXPECT_EQ(state.map_number, map_number) << "and the map with it";
+  ASSERT_EQ(tell(1.14), Status::kOk);
+  ASSERT_EQ(sut.state(state), Status::kOk);
+  EXPECT_NEAR(state.p_WB.x(), 2.0 * 1.14, 1e-9);
+  // Turned by 0.1 rad.
+  ++sample.frame_number;
+  sample.q_WB = {std::cos(0.05), 0.0, 0.0, std::sin(0.05)};
+  ASSERT_EQ(tell(1.16), Status::kOk);
+  ASSERT_EQ(sut.state(state), Status::kOk);
+  EXPECT_EQ(state.map_number, map_number + 1);
+  // Too long ago.
+  ++sample.frame_number;
+  ASSERT_EQ(tell(1.46), Status::kOk);
+  ASSERT_EQ(sut.state(state), Status::kOk);
+  EXPECT_EQ(state.map_number, map_number + 2);
+  // On the ground ours jumps with it.
+  ++sample.frame_number;
+  flies = false;
+  ASSERT_EQ(tell(1.48), Status::kOk);
+  ASSERT_EQ(sut.state(state), Status::kOk);
+  EXPECT_NEAR(state.p_WB.x(), 7.0 + 2.0 * 1.48, 1e-9);
+  EXPECT_EQ(state.shift_W, Vector3::Zero());
+  EXPECT_EQ(sut.follow(sample, at(1.48), true), Status::kStale) << "the time does not rise";
+  EXPECT_EQ(sut.follow(sample, at(1.78), true), Status::kStale) << "too old";
+  sample.p_WB_m[0] = std::numeric_limits<double>::quiet_NaN();
+  sample.stamp = at(1.49);
+  EXPECT_EQ(sut.follow(sample, at(1.5), true), Status::kInvalidArgument);
+  ASSERT_EQ(sut.state(state), Status::kOk);
+  EXPECT_EQ(state.stamp, at(1.48));
 }
 
 TEST(Estimator, TheBarometerHoldsTheHeightWithoutGnss) {

@@ -312,6 +312,67 @@ TEST_F(BrickMapTest, ACoarseLookNotesSurfacesInUnknownBricksUntilAFinerOne) {
   EXPECT_GT(cells(0)[kOccupied], 1000);
 }
 
+/// Of a map with finer cells a block is as large as a cell of two levels below it is here.
+class FineBrickMap : public BrickMapTest {
+ protected:
+  /// Free volume, and occupied cells of 0.1 m around the pillar, after a look at cells of 1.6 m.
+  std::pair<double, int> look_at_coarse_cells(double finest_m, double volume_m3) {
+    std::vector<std::byte> block(200U << 20U);
+    core::Arena arena(block);
+    config_.lattice.finest_m = finest_m;
+    config_.max_bricks = 9000;
+    BrickMap map(config_, arena);
+    const std::array<Vector3, 2> ahead{at_, at_ + Vector3(4, 0, 0)};
+    (void)map.integrate({scene_.look(at_), config_.lattice.coarsest_level_within(1.6), volume_m3, ahead},
+                        unlimited_, result_);
+    core::Work work;
+    (void)map.export_view({0, kInfinity, at_}, unlimited_, work);
+    std::uint64_t lookups = 0;
+    int occupied = 0;
+    for (double x = 5.95; x < 6.2; x += 0.1)
+      for (double y = -1.95; y < 2; y += 0.1)
+        for (double z = 4.05; z < 6; z += 0.1)
+          occupied += map.view().at(Vector3(x, y, z), lookups) == CellState::kOccupied ? 1 : 0;
+    return {result_.work.volume_m3, occupied};
+  }
+};
+
+TEST_F(FineBrickMap, ALookAtWholeBlocksFindsWhatOneAtCellsOfThatSizeFinds) {
+  for (const double volume_m3 : {2000.0, kInfinity}) {
+    const auto [cells_m3, in_cells] = look_at_coarse_cells(0.2, volume_m3);
+    const auto [blocks_m3, in_blocks] = look_at_coarse_cells(0.1, volume_m3);
+    EXPECT_GT(cells_m3, 1000.0);
+    EXPECT_GT(blocks_m3, 0.99 * cells_m3) << "near blocks do not hide far ones";
+    EXPECT_GT(in_cells, 50);
+    EXPECT_GT(in_blocks, 50) << "surfaces are written, too";
+  }
+}
+
+TEST_F(BrickMapTest, ABlockHasItsRevisionUntilItsCellsChange) {
+  const std::array<Vector3, 1> here{at_};
+  const MapView& view = sut_->view();
+  const auto corner_W = [this](double x, double y, double z) {
+    const double edge_m = block_m(config_.lattice.finest_m);
+    return Vector3(edge_m * std::floor(x / edge_m), edge_m * std::floor(y / edge_m),
+                   edge_m * std::floor(z / edge_m));
+  };
+  const Vector3 pillar_W = corner_W(7, 0, 5), behind_W = corner_W(25, 0, 5),
+                open_W = corner_W(at_.x(), at_.y(), at_.z());
+  EXPECT_EQ(view.revision(pillar_W), view.revision(behind_W)) << "all unknown";
+  const std::uint64_t unknown = view.revision(behind_W);
+  for (int i = 0; i < 12; ++i)
+    (void)sut_->integrate({scene_.look(at_), 0, kInfinity, here}, unlimited_, result_);
+  const std::uint64_t seen = view.revision(pillar_W);
+  EXPECT_NE(seen, unknown);
+  EXPECT_NE(seen, view.revision(open_W));
+  EXPECT_EQ(view.revision(behind_W), unknown);
+  (void)sut_->integrate({scene_.look(at_), 0, kInfinity, here}, unlimited_, result_);
+  EXPECT_EQ(view.revision(pillar_W), seen) << "the same once more";
+  scene_.solid.push_back({Vector3(5, -2, 4), Vector3(6, 2, 6)});
+  (void)sut_->integrate({scene_.look(at_), 0, kInfinity, here}, unlimited_, result_);
+  EXPECT_NE(view.revision(pillar_W), seen);
+}
+
 /// What a pillar of the scene leaves in the map over many scans.
 class Ageing : public BrickMapTest {
  protected:

@@ -5,8 +5,11 @@
 
 #include <functional>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "stages/perception/brick_map.hpp"
+#include "stages/perception/cloud_images.hpp"
 #include "tests/stages/perception/scene.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
@@ -38,7 +41,7 @@ class FrameGuardTest : public ::testing::Test {
   FrameGuardTest() {
     scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)}, {Vector3(6, -2, 0), Vector3(8, 2, 12)}};
   }
-  int refused(const std::vector<PosedDepthFrame>& frames) {
+  int refused(std::span<const PosedDepthFrame> frames) {
     sut_.begin(frames);
     int count = 0;
     for (const PosedDepthFrame& f : frames) count += sut_.check(f) == Status::kOk ? 0 : 1;
@@ -100,6 +103,30 @@ TEST_F(FrameGuardTest, AStillCameraWithoutNoiseIsNotFrozen) {
     for (PosedDepthFrame& f : next.frames) f.error = {0.0, 0.0};
     EXPECT_EQ(refused(next.frames), 0) << n;
   }
+}
+
+/// Rays of a LiDAR that meet nothing end at its range, in every sweep alike, whatever the image's depths say of them.
+TEST_F(FrameGuardTest, TheEndOfALidarsRangeMayRepeat) {
+  constexpr float kRange_m = 70.0F;
+  std::vector<std::byte> memory(CloudImages::arena_bytes({}));
+  core::Arena arena(memory);
+  CloudImages images({}, arena);
+  const auto sweep = [&](double time_s, float first_m) {
+    std::vector<std::array<float, 3>> points;
+    for (int ring = -45; ring <= 45; ring += 3) {
+      for (int turn = 0; turn < 360; turn += 1) {
+        const float up = static_cast<float>(ring) * 0.0174533F,
+                    around = static_cast<float>(turn) * 0.0174533F;
+        const float range_m = turn < 60 ? first_m : 1.01F * kRange_m;
+        points.push_back({range_m * std::cos(up) * std::cos(around),
+                          range_m * std::cos(up) * std::sin(around), range_m * std::sin(up)});
+      }
+    }
+    EXPECT_EQ(images.make({points, at_s(time_s), kRange_m, {}, Vector3::Zero(), 0.3F}), Status::kOk);
+    return refused(images.frames());
+  };
+  for (int n = 0; n < 5; ++n) EXPECT_EQ(sweep(1.0 + 0.1 * n, 10.0F + 0.01F * static_cast<float>(n)), 0) << n;
+  EXPECT_GT(sweep(2.0, 10.04F), 0) << "a surface that repeats is frozen";
 }
 
 TEST_F(FrameGuardTest, RefusesFramesOfAnotherTime) {

@@ -29,16 +29,6 @@ SmoothRequest request_of(const std::vector<Vector3>& path, const Vector3& v_W = 
   return r;
 }
 
-/// Fourth derivative of a segment at t.
-Vector3 snap(const PolynomialSegment& s, double t) {
-  Vector3 sum = Vector3::Zero();
-  double power = 1.0;
-  for (std::size_t k = 4; k < 10; ++k, power *= t) {
-    sum += static_cast<double>(k * (k - 1) * (k - 2) * (k - 3)) * power * s.coefficient[k];
-  }
-  return sum;
-}
-
 void expect_continuous(const Trajectory& t) {
   for (std::size_t k = 0; k + 1 < t.segment_count; ++k) {
     Trajectory a, b;
@@ -52,13 +42,10 @@ void expect_continuous(const Trajectory& t) {
     EXPECT_LT((end.p_W - begin.p_W).norm(), 1e-6);
     EXPECT_LT((end.v_W - begin.v_W).norm(), 1e-6);
     EXPECT_LT((end.a_W - begin.a_W).norm(), 1e-5);
-    EXPECT_LT((end.j_W - begin.j_W).norm(), 1e-4);
-    EXPECT_LT((snap(t.segment[k], t.segment[k].duration_s) - snap(t.segment[k + 1], 0.0)).norm(),
-              1e-3 * (1.0 + snap(t.segment[k + 1], 0.0).norm()));
   }
 }
 
-TEST(Smoother, IsContinuousUpToSnapWithinTheLimitsAndEndsAtRest) {
+TEST(Smoother, IsContinuousUpToAccelerationWithinTheLimitsAndEndsAtRest) {
   Smoother sut;
   const test::BoxView view = open_view();
   core::UnlimitedBudget unlimited;
@@ -87,13 +74,14 @@ TEST(Smoother, IsContinuousUpToSnapWithinTheLimitsAndEndsAtRest) {
     EXPECT_LT(t.at_s(t.duration_s() * (1.0 - 1e-9)).v_W.norm(), 1e-3) << "at rest at its end";
     for (double s = 0.0; s < t.duration_s(); s += 0.01) {
       const TrajectoryPoint p = t.at_s(s);
-      ASSERT_LE(p.v_W.norm(), 6.0 * 1.10) << "sampled finer than the smoother samples";
-      ASSERT_LE(p.a_W.norm(), 4.0 * 1.20);
+      ASSERT_LE(p.v_W.norm(), 6.0 * 1.0001);
+      ASSERT_LE(p.a_W.norm(), 4.0 * 1.0001);
+      ASSERT_LE(p.j_W.norm(), 20.0 * 1.001);
     }
     EXPECT_GT(t.brake_begin_s, 0.0);
     EXPECT_LT(t.brake_begin_s, t.duration_s());
   }
-  EXPECT_GT(flown, 160) << "the rest starts too fast for its first corner";
+  EXPECT_EQ(flown, 200) << "in the open there is always a way, after a stop at worst";
 }
 
 TEST(Smoother, FliesFastAndBrakesLate) {
@@ -103,9 +91,36 @@ TEST(Smoother, FliesFastAndBrakesLate) {
   SmoothResult result;
   ASSERT_EQ(sut.smooth(request_of({Vector3::Zero(), Vector3(40, 0, 0)}), view, unlimited, result),
             Status::kOk);
-  // Trapezoid at 0.6 * 4 = 2.4 m/s2: up and down 7.5 m each in 2.5 s, 25 m at 6 m/s in 4.17 s: 9.17 s.
-  EXPECT_NEAR(result.trajectory.duration_s(), 9.17, 0.3 * 9.17);
-  EXPECT_GT(result.trajectory.at_s(result.trajectory.duration_s() * 0.5).v_W.norm(), 5.0);
+  // Up and down in 6 / 4 + 4 / 20 = 1.7 s and 5.1 m each, 29.8 m at 6 m/s in 4.97 s: 8.37 s; the last 1.7 s brake.
+  const double duration_s = result.trajectory.duration_s();
+  EXPECT_NEAR(duration_s, 2.0 * 1.7 + 29.8 / 6.0, 1e-3);
+  EXPECT_NEAR(result.trajectory.brake_begin_s, duration_s - 1.7, 1e-3);
+  EXPECT_NEAR(result.trajectory.at_s(duration_s * 0.5).v_W.norm(), 6.0, 1e-3);
+}
+
+TEST(Smoother, SpeedsUpAgainstDragAndBrakesWithoutIt) {
+  Smoother sut;
+  const test::BoxView view = open_view();
+  core::UnlimitedBudget unlimited;
+  std::vector<Vector3> path{Vector3::Zero(), Vector3(40, 0, 0)};
+  SmoothRequest r = request_of(path);
+  r.limits.speeding_up_mps2 = 2.0;
+  SmoothResult result;
+  ASSERT_EQ(sut.smooth(r, view, unlimited, result), Status::kOk);
+  // Up in 6 / 2 + 2 / 20 = 3.1 s and 9.3 m, down in 1.7 s and 5.1 m as before.
+  const double duration_s = result.trajectory.duration_s();
+  EXPECT_NEAR(duration_s, 3.1 + 1.7 + (40.0 - 9.3 - 5.1) / 6.0, 1e-3);
+  EXPECT_NEAR(result.trajectory.brake_begin_s, duration_s - 1.7, 1e-3);
+  // Replanned at any instant: never harder, and it still arrives.
+  for (double s = 0.1; s < duration_s - 0.8; s += 0.1) {
+    r.start = result.trajectory.at_s(s);
+    path.front() = r.start.p_W;
+    SmoothResult again;
+    ASSERT_EQ(sut.smooth(r, view, unlimited, again), Status::kOk) << s;
+    for (double t = 0.0; t < again.trajectory.duration_s(); t += 0.01)
+      ASSERT_LE(again.trajectory.at_s(t).a_W.x(), std::max(2.0, r.start.a_W.x()) * 1.0001) << s << " " << t;
+    EXPECT_LT((again.trajectory.end_W() - Vector3(40, 0, 0)).norm(), 0.05) << s;
+  }
 }
 
 TEST(Smoother, StaysInFreeSpaceAroundACorner) {
@@ -197,55 +212,115 @@ TEST(Smoother, NamesDegenerateInput) {
       Status::kInvalidArgument);
 }
 
-TEST(Smoother, HasLessSnapThanItsNeighbours) {
-  // Optimality: moving the free derivatives of an inner knot must not lower the integral of squared snap.
-  // Three segments, the middle knots perturbed by adding to segment 1 a polynomial that changes velocity at
-  // one joint only.
+TEST(Smoother, TurnsInTheOpenWithoutAStop) {
   Smoother sut;
   const test::BoxView view = open_view();
   core::UnlimitedBudget unlimited;
   SmoothResult result;
-  ASSERT_EQ(sut.smooth(request_of({Vector3::Zero(), Vector3(6, 2, 0), Vector3(12, -1, 0)}), view, unlimited,
+  ASSERT_EQ(sut.smooth(request_of({Vector3::Zero(), Vector3(20, 0, 0), Vector3(20, 20, 0)}), view, unlimited,
                        result),
             Status::kOk);
   const Trajectory& t = result.trajectory;
-  ASSERT_GE(t.segment_count, 3U);
-  const auto cost = [](const PolynomialSegment& s) {
-    double sum = 0.0;
-    constexpr int kSteps = 2000;
-    for (int i = 0; i < kSteps; ++i)
-      sum += snap(s, s.duration_s * (i + 0.5) / kSteps).squaredNorm() * s.duration_s / kSteps;
-    return sum;
-  };
-  // h(t) with h = h' = ... = 0 at both ends but h'' = 1 at the joint, the mirror image on the other side.
-  const auto bump = [](PolynomialSegment s, bool at_end, double size) {
-    const double T = s.duration_s;
-    // tau^2 (1 - tau)^5 (1 + 5 tau + 15 tau^2): second derivative 2 at tau = 0, third and fourth zero.
-    const std::array<double, 10> c{0, 0, 1, 0, 0, -35, 105, -126, 70, -15};
-    for (std::size_t k = 0; k < 10; ++k) {
-      if (!at_end) {
-        s.coefficient[k] += Vector3(size * c[k] / std::pow(T, static_cast<double>(k)), 0, 0);
-        continue;
-      }
-      // Mirrored: c(1 - tau), expanded.
-      for (std::size_t m = 0; m <= k; ++m) {
-        double binomial = 1.0;
-        for (std::size_t i = 0; i < m; ++i)
-          binomial = binomial * static_cast<double>(k - i) / static_cast<double>(i + 1);
-        s.coefficient[m] += Vector3(
-            size * c[k] * binomial * (m % 2 == 0 ? 1.0 : -1.0) / std::pow(T, static_cast<double>(m)), 0, 0);
-      }
+  // A right angle at 6 m/s changes the velocity by 8.49 m/s in 8.49 / 4 + 0.2 s, along a line through 4.24 m/s.
+  double least_mps = 6.0;
+  for (double s = 1.8; s < t.duration_s() - 1.8; s += 0.01)
+    least_mps = std::min(least_mps, t.at_s(s).v_W.norm());
+  EXPECT_NEAR(least_mps, 6.0 / std::sqrt(2.0), 0.02);
+  EXPECT_NEAR(t.duration_s(), 40.0 / 6.0 + 1.7, 1e-3)
+      << "as much shorter than the corner as it is slower there";
+}
+
+TEST(Smoother, GoesOnFromTheMiddleOfItsOwnTrajectory) {
+  // Replanned along the same corners at any instant it does not arrive later: nothing is braked for twice.
+  Smoother sut;
+  const test::BoxView view = open_view();
+  core::UnlimitedBudget unlimited;
+  const std::vector<Vector3> path{Vector3::Zero(), Vector3(14, 0, 0), Vector3(24, 9, 1), Vector3(40, 9, 1)};
+  SmoothResult whole;
+  ASSERT_EQ(sut.smooth(request_of(path), view, unlimited, whole), Status::kOk);
+  const double duration_s = whole.trajectory.duration_s();
+  for (double s = 0.1; s < duration_s - 0.8; s += 0.1) {
+    const TrajectoryPoint at = whole.trajectory.at_s(s);
+    std::vector<Vector3> rest{at.p_W};
+    for (const Vector3& p_W : path) {
+      const Vector3 next_W = &p_W == &path.back() ? p_W : *(&p_W + 1);
+      if ((p_W - at.p_W).dot(next_W - p_W) > 0.0 && (p_W - at.p_W).dot(at.v_W) > 0.0) rest.push_back(p_W);
     }
-    return s;
-  };
-  const double before = cost(t.segment[0]) + cost(t.segment[1]);
-  // Second derivatives at the joint must agree: 2 size / T^2 on both sides.
-  const double ratio = (t.segment[1].duration_s * t.segment[1].duration_s) /
-                       (t.segment[0].duration_s * t.segment[0].duration_s);
-  for (const double size : {0.02, -0.02, 0.1, -0.1}) {
-    const double after = cost(bump(t.segment[0], true, size)) + cost(bump(t.segment[1], false, size * ratio));
-    EXPECT_GT(after, before * (1.0 - 1e-9)) << size;
+    if ((rest.back() - path.back()).norm() > 0.0) rest.push_back(path.back());
+    SmoothRequest r = request_of(rest);
+    r.start = at;
+    SmoothResult result;
+    ASSERT_EQ(sut.smooth(r, view, unlimited, result), Status::kOk) << s;
+    EXPECT_LT((result.trajectory.at_s(0.0).a_W - at.a_W).norm(), 1e-9);
+    EXPECT_LT((result.trajectory.end_W() - path.back()).norm(), 0.05) << s;
+    EXPECT_LT(s + result.trajectory.duration_s(), duration_s + 0.5) << s;
   }
+}
+
+TEST(Smoother, LeavesAPathThatBeginsAcrossItsVelocity) {
+  // 5 m/s to the side of the path: it bends onto a line to the next point, or stops first.
+  Smoother sut;
+  test::BoxView view = open_view();
+  core::UnlimitedBudget unlimited;
+  SmoothResult result;
+  const std::vector<Vector3> path{Vector3::Zero(), Vector3(15, 0, 0), Vector3(15, 15, 0)};
+  const SmoothRequest r = request_of(path, Vector3(0, 5, 0));
+  ASSERT_EQ(sut.smooth(r, view, unlimited, result), Status::kOk);
+  EXPECT_EQ(result.trajectory.at_s(0.0).v_W, Vector3(0, 5, 0));
+  EXPECT_LT((result.trajectory.end_W() - r.path_W.back()).norm(), 1e-6);
+  const double open_s = result.trajectory.duration_s();
+  // Where it would bend: slower, that is sharper, it passes.
+  const double bends_m = result.trajectory.at_s(1.5).p_W.x();
+  view.occupied = {{Vector3(bends_m, result.trajectory.at_s(1.5).p_W.y(), -9), Vector3(14, 9, 9)}};
+  std::uint64_t before = 0;
+  ASSERT_FALSE(is_trajectory_free(view, result.trajectory, 0.0, 0.9, before));
+  ASSERT_EQ(sut.smooth(r, view, unlimited, result), Status::kOk);
+  std::uint64_t lookups = 0;
+  EXPECT_TRUE(is_trajectory_free(view, result.trajectory, 0.0, 0.9, lookups));
+  EXPECT_GT(result.trajectory.duration_s(), open_s);
+}
+
+TEST(Smoother, ClimbsWithinTheVerticalLimit) {
+  Smoother sut;
+  const test::BoxView view = open_view();
+  core::UnlimitedBudget unlimited;
+  const std::vector<Vector3> path{Vector3::Zero(), Vector3(10, 0, 0), Vector3(14, 0, 12), Vector3(30, 0, 12)};
+  SmoothRequest r = request_of(path);
+  r.limits = {20.0, 15.0, 100.0, 8.0, 4.0, 4.5};
+  SmoothResult result;
+  ASSERT_EQ(sut.smooth(r, view, unlimited, result), Status::kOk);
+  double most_mps2 = 0.0;
+  for (double s = 0.0; s < result.trajectory.duration_s(); s += 0.005)
+    most_mps2 = std::max(most_mps2, std::fabs(result.trajectory.at_s(s).a_W.z()));
+  EXPECT_LE(most_mps2, 4.5 * 1.001);
+  EXPECT_GT(most_mps2, 2.0);
+}
+
+TEST(Smoother, LeavesAClimbWithinTheVerticalLimit) {
+  Smoother sut;
+  const test::BoxView view = open_view();
+  core::UnlimitedBudget unlimited;
+  const std::vector<Vector3> level{Vector3::Zero(), Vector3(40, 0, 0)};
+  SmoothRequest r = request_of(level, Vector3(16.0, 0.0, 3.3));
+  r.limits = {20.0, 18.0, 100.0, 8.0, 4.0, 4.5};
+  SmoothResult result;
+  ASSERT_EQ(sut.smooth(r, view, unlimited, result), Status::kOk);
+  for (double s = 0.0; s < result.trajectory.duration_s(); s += 0.005)
+    ASSERT_LE(std::fabs(result.trajectory.at_s(s).a_W.z()), 4.5 * 1.001) << s;
+}
+
+TEST(Smoother, FliesLongWindingPathsInParts) {
+  Smoother sut;
+  const test::BoxView view = open_view();
+  core::UnlimitedBudget unlimited;
+  std::vector<Vector3> path{Vector3::Zero()};
+  for (int i = 0; i < 30; ++i) path.push_back(path.back() + Vector3(2.0, i % 2 == 0 ? 3.0 : -3.0, 0.0));
+  SmoothResult result;
+  ASSERT_EQ(sut.smooth(request_of(path), view, unlimited, result), Status::kOk);
+  double nearest_m = 1e9;
+  for (const Vector3& p_W : path) nearest_m = std::min(nearest_m, (p_W - result.trajectory.end_W()).norm());
+  EXPECT_LT(nearest_m, 1e-6) << "ends at one of its points";
+  EXPECT_GT(result.trajectory.end_W().x(), 6.0);
 }
 
 TEST(Smoother, BrakesWithinTheLimit) {
@@ -275,20 +350,6 @@ TEST(Smoother, BrakesWithinTheLimit) {
   TrajectoryPoint bad;
   bad.v_W.x() = std::nan("");
   EXPECT_EQ(sut.brake(bad, {}, {6.0, 4.0}, t), Status::kInvalidArgument);
-}
-
-TEST(MinimumSnap, RefusesWhatHasNoSolution) {
-  const MinimumSnap sut;
-  Trajectory t;
-  const std::vector<Vector3> knots{Vector3::Zero(), Vector3(3, 1, 0), Vector3(6, 0, 0)};
-  EXPECT_TRUE(sut.solve(knots, std::vector<double>{0.0, 1.0, 1.0}, {}, t));
-  EXPECT_FALSE(sut.solve(knots, std::vector<double>{0.0, 1.0}, {}, t)) << "sizes differ";
-  EXPECT_FALSE(sut.solve(knots, std::vector<double>{0.0, 1.0, 0.0}, {}, t)) << "no time";
-  EXPECT_FALSE(sut.solve(knots, std::vector<double>{0.0, std::nan(""), 1.0}, {}, t));
-  EXPECT_FALSE(sut.solve(std::vector<Vector3>{Vector3::Zero()}, std::vector<double>{0.0}, {}, t));
-  TrajectoryPoint start;
-  start.a_W.x() = std::nan("");
-  EXPECT_FALSE(sut.solve(knots, std::vector<double>{0.0, 1.0, 1.0}, start, t));
 }
 
 TEST(Smoother, SmoothDoesNotAllocate) {

@@ -107,6 +107,20 @@ TEST_F(WayMemoryTest, ProvesThatThereIsNoWay) {
   EXPECT_EQ(sut_->to_goal_m(start_W_), kInfinity);
 }
 
+TEST_F(WayMemoryTest, AShellAroundTheGoalIsAProofThoughTheWorldGoesOn) {
+  goal_W_ = Vector3(15, 0, 5);
+  box(12, -3, 12.6, 3);
+  box(12, -3, 18, -2.4);
+  box(12, 2.4, 18, 3);
+  make();
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk) << "open behind";
+  box(17.4, -3, 18, 3);
+  EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath);
+  // The same shell around the vehicle.
+  std::swap(start_W_, goal_W_);
+  EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath);
+}
+
 TEST_F(WayMemoryTest, AGapThatMayBeWideEnoughProvesNothing) {
   // Three cells of it are free: as wide as a vehicle of 0.45 m, which plans with 0.55, and so with four cells.
   config_.radius_m = 0.55;
@@ -127,8 +141,8 @@ TEST_F(WayMemoryTest, AGapThatMayBeWideEnoughProvesNothing) {
   EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath);
 }
 
-TEST_F(WayMemoryTest, AHoleInAWallIsNoWayWhereNoRoomFitsAndNothingWasSeenBehindIt) {
-  // 1.2 m of a wall that were not seen: no place of the vehicle, which is 1.8 m wide.
+TEST_F(WayMemoryTest, AHoleInAWallThatNobodySawIsAWayUntilItIsSeenToBeTooNarrow) {
+  // 1.2 m of a wall: as wide as the vehicle, which plans with 1.8 m.
   config_.body_m = 0.6;
   box(-15, 20, 20.6, 20.6);
   box(-15, -20.6, 20.6, -20);
@@ -137,9 +151,14 @@ TEST_F(WayMemoryTest, AHoleInAWallIsNoWayWhereNoRoomFitsAndNothingWasSeenBehindI
   box(20, 0.6, 20.6, 21);
   view_.free_W.max_W.x() = 20.0;
   make();
-  EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath);
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  const Vector3 end_W = last_known(start_W_);
+  EXPECT_GT(end_W.x(), 17.0) << "goes there to look";
+  EXPECT_LT(std::fabs(end_W.y()), 2.0);
   view_.free_W.max_W.x() = 25.0;
   EXPECT_EQ(look_and_solve(start_W_), Status::kInfeasible) << "seen to be open";
+  box(20, -1, 20.6, 1);
+  EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath) << "seen to be closed";
 }
 
 TEST_F(WayMemoryTest, AFenceThatClosesEverythingIsAProof) {

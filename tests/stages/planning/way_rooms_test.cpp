@@ -51,7 +51,7 @@ TEST(WayRooms, PlacesAreThoseOfABoxOfCells) {
     const Scene scene(seed);
     const std::size_t width = 1 + seed % 7;
     WayPlaces places;
-    find_places(scene.cells, static_cast<int>(width), places);
+    find_places(scene.cells, static_cast<int>(width), 0, places);
     for (std::size_t i = 0; i < 4096; ++i) {
       const std::size_t x = i % 16, y = i / 16 % 16, z = i / 256;
       bool free = true, occupied = false;
@@ -71,7 +71,7 @@ TEST(WayRooms, AreTheConnectedPlacesOfOneKind) {
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     const Scene scene(seed);
     WayPlaces places;
-    find_places(scene.cells, 4, places);
+    find_places(scene.cells, 4, 0, places);
     WayRooms rooms;
     number_rooms(places, rooms);
     // Neighbours of one kind are in one room, unless the numbers ran out; each kind has its numbers.

@@ -15,6 +15,7 @@ constexpr std::array<double, 7> kSpeeds_mps{0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
 TEST(Stopping, TheModelIsNeverShorterThanTheVehicleAndAtMostTwiceAsLong) {
   for (const board::StoppingPoint& p : board::stopping_sweep(kSpeeds_mps, 4, {})) {
     const double model_m = kSitlQuadrotorStopping.distance_m(p.speed_mps);
+    std::printf("%.1f m/s: %.3f m, model %.3f m\n", p.speed_mps, p.distance_m, model_m);
     EXPECT_GT(p.distance_m, 0.0);
     EXPECT_GE(model_m, p.distance_m) << p.speed_mps << " m/s";
     EXPECT_LE(model_m, 2.0 * p.distance_m) << p.speed_mps << " m/s";

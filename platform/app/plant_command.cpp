@@ -1,0 +1,185 @@
+#include "platform/app/plant_command.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "platform/app/earth_argument.hpp"
+#include "platform/app/exit_code.hpp"
+#include "platform/app/options.hpp"
+#include "platform/app/plant_arguments.hpp"
+#include "platform/input/input_error.hpp"
+#include "platform/input/stop_signal.hpp"
+#include "platform/live/plant.hpp"
+#include "platform/report/progress_line.hpp"
+
+namespace roborun::app {
+namespace {
+
+struct PlantOptions {
+  PlantArguments common;
+  std::string origin;
+  std::string autopilot{"none"};
+  std::string mavlink{"udpout://127.0.0.1:14540"};
+  std::string key;
+  double pilot_s{0.0};
+  double seconds{0.0};
+  bool no_pictures{false};
+  bool json{false};
+};
+
+std::string text_of(const Vector3& p) { return fmt::format("{:g},{:g},{:g}", p.x(), p.y(), p.z()); }
+
+/// Where the runtime has to wait for what this link sends.
+std::string far_end_of(const mavlink::LinkAddress& link) {
+  using Kind = mavlink::LinkAddress::Kind;
+  if (link.kind == Kind::kUdpOut) return fmt::format("udpin://{}:{}", link.host, link.number);
+  if (link.kind == Kind::kUdpIn) return fmt::format("udpout://{}:{}", link.host, link.number);
+  return "URL";
+}
+
+/// What flies in this world.
+std::string run_line(const PlantOptions& options, const sitl::World& world, const live::PlantConfig& config) {
+  const std::string link =
+      config.autopilot ? fmt::format("{} --autopilot {} --arm --port {}", far_end_of(config.autopilot->link),
+                                     options.autopilot, options.common.port)
+                       : "port:" + options.common.port;
+  std::string line =
+      fmt::format("roborun run --vehicle {} --link {} --goal {} --bounds={},{}", options.common.vehicle, link,
+                  text_of(world.goal_W()), text_of(world.bounds_W().min_W), text_of(world.bounds_W().max_W));
+  if (world.start_W().z() != world.goal_W().z()) line += fmt::format(" --cruise {:g}", world.start_W().z());
+  // The runtime's world begins where the vehicle stands, or with the autopilot's frame.
+  if (!config.autopilot && mission::ground_below(world).norm() > 0.01)
+    line += fmt::format(" --origin {:.8f},{:.8f},{:g}", config.origin.latitude_deg,
+                        config.origin.longitude_deg, config.origin.height_m);
+  return line;
+}
+
+void print(const live::PlantReport& r, bool json) {
+  if (json) {
+    nlohmann::ordered_json j{{"time_s", r.time_s}, {"collided", r.collided}};
+    j["least_clearance_m"] = r.least_clearance_m ? nlohmann::ordered_json(*r.least_clearance_m) : nullptr;
+    j["reached_goal"] = r.reached_goal;
+    j["frames_sent"] = r.frames_sent;
+    j["faults"] = r.faults;
+    j["reason"] = r.reason;
+    j["distance_m"] = r.distance_m;
+    j["stood_still_s"] = r.stood_still_s;
+    j["commands"] = r.commands;
+    j["speed_mps"] = r.speed_mps;
+    if (r.autopilot)
+      j["autopilot"] = {{"mode", r.autopilot->mode},
+                        {"armed", r.autopilot->armed},
+                        {"set_points", r.autopilot->set_points},
+                        {"refused_set_points", r.autopilot->refused_set_points},
+                        {"timeouts", r.autopilot->timeouts},
+                        {"releases", r.autopilot->releases},
+                        {"lost_frames", r.autopilot->lost_frames},
+                        {"doubled_frames", r.autopilot->doubled_frames}};
+    fmt::print("{}\n", j.dump());
+    return;
+  }
+  fmt::print("{} after {:.1f} s and {:.1f} m: {}{}\n", r.reason, r.time_s, r.distance_m,
+             r.reached_goal ? "was at the goal" : "was not at the goal",
+             r.least_clearance_m ? fmt::format(", least clearance {:.2f} m", *r.least_clearance_m) : "");
+  fmt::print("{} pictures sent, {} {} heard, {} faults of its own\n", r.frames_sent, r.commands,
+             r.autopilot ? "set-points" : "bus frames", r.faults);
+  if (r.autopilot)
+    fmt::print("autopilot: mode {}, {}, {:.1f} m/s, {} time-outs\n", r.autopilot->mode,
+               r.autopilot->armed ? "armed" : "disarmed", r.speed_mps, r.autopilot->timeouts);
+}
+
+std::optional<live::PlantAutopilot> autopilot_of(const PlantOptions& options) {
+  const auto kind = mission::autopilot_of("--autopilot", options.autopilot);
+  if (!kind) {
+    if (options.pilot_s > 0.0) throw InputError("--pilot-after: must go with --autopilot px4 or arducopter");
+    if (!options.key.empty()) throw InputError("--signing-key: must go with --autopilot px4 or arducopter");
+    return std::nullopt;
+  }
+  live::PlantAutopilot autopilot{*kind, mavlink::parse_link(options.mavlink),
+                                 mavlink::read_key("--signing-key", options.key), std::nullopt};
+  if (options.pilot_s > 0.0) autopilot.pilot_s = options.pilot_s;
+  return autopilot;
+}
+
+int plant(const PlantOptions& options) {
+  live::PlantConfig config;
+  config.mission = plant_mission(options.common);
+  config.port = options.common.port;
+  config.pictures = !options.no_pictures;
+  if (const auto origin = origin_of(options.origin)) config.origin = *origin;
+  config.autopilot = autopilot_of(options);
+  if (options.seconds > 0.0) config.seconds = options.seconds;
+  const sitl::World world = plant_world(options.common, config.mission);
+  const input::StopOnSignal stop;
+  config.stop = &input::StopOnSignal::requested;
+  std::optional<report::ProgressLine> line(std::in_place);
+  const live::PlantReport result = live::run_plant(
+      world, config,
+      [&] {
+        fmt::print(stderr, "roborun: plant {} runs: {}\n", options.common.port,
+                   run_line(options, world, config));
+      },
+      [&](const live::PlantProgress& p) {
+        if (line->due())
+          line->show(fmt::format("plant {:5.0f} s, {}, at ({:.1f}, {:.1f}, {:.1f}) m, {:.1f} m/s", p.time_s,
+                                 p.is_heard ? "the runtime is there" : "nobody flies", p.p_WB.x(), p.p_WB.y(),
+                                 p.p_WB.z(), p.speed_mps));
+      });
+  line.reset();
+  print(result, options.json);
+  if (result.reason == "interrupted") return kInterrupted;
+  return result.collided ? kNotGood : kDone;
+}
+
+}  // namespace
+
+void add_plant_command(CLI::App& app, std::function<int()>& run) {
+  const auto options = std::make_shared<PlantOptions>();
+  CLI::App* command = app.add_subcommand(
+      "plant",
+      "World, physics and sensors as a process of their own: roborun run flies in it over sensor ports");
+  command->footer(
+      "Writes the ports NAME-camera1, NAME-imu, NAME-gnss, ... of the vehicle (roborun port list), its bus "
+      "and its "
+      "kill lines,\nin real time, and says the line that flies in it. Ends once the vehicle has flown and "
+      "stands with "
+      "its motors off,\nwhen it collides, after --seconds, or at Ctrl-C.\n\n"
+      "Example, in two terminals:\n"
+      "  roborun plant --vehicle paper --env 14 --seed 1 --port demo\n"
+      "  roborun run --vehicle paper --link port:demo --goal 900,0,5 --bounds=-100,-100,1.5,1000,100,10\n\n"
+      "Exit code: 0 done, 1 the vehicle collided, 2 bad input, or ports that cannot be made, 130 "
+      "interrupted.");
+  add_plant_arguments(*command, options->common);
+  command->add_option(
+      "--origin", options->origin,
+      "Where the world's (0, 0, 0) is on the earth: LATITUDE,LONGITUDE,HEIGHT [47.397742,8.545594,488]");
+  command
+      ->add_option(
+          "--autopilot", options->autopilot,
+          "px4 or arducopter: a fake one flies the vehicle, and speaks MAVLink; none: the runtime does")
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--mavlink", options->mavlink,
+          "Where that autopilot speaks: udpout://HOST:PORT, udpin://[HOST]:PORT or serial:///dev/NAME:BAUD")
+      ->capture_default_str();
+  command->add_option("--signing-key", options->key,
+                      "File with 64 hexadecimal digits: that autopilot signs, and hears nothing unsigned");
+  add_number(*command, "--pilot-after", options->pilot_s, 0.1, 86400.0,
+             "After this many seconds in the air the autopilot's pilot takes over and lands")
+      ->default_str("never");
+  add_number(*command, "--seconds", options->seconds, 0.1, 86400.0,
+             "End after this time at the latest; default: as long as it takes")
+      ->default_str("");
+  command->add_flag("--no-pictures", options->no_pictures,
+                    "Depth images and clouds are made by a process of their own: roborun feed plant");
+  command->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
+  command->callback([options, &run] { run = [options] { return plant(*options); }; });
+}
+
+}  // namespace roborun::app

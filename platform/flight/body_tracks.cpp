@@ -1,0 +1,132 @@
+#include "platform/flight/body_tracks.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/geometry/math.hpp"
+
+namespace roborun::flight {
+namespace {
+
+constexpr Nanos kLasts{2'000'000'000};  // without being seen
+constexpr int kSure = 3;                // sightings
+constexpr double kMoves_mps = 0.4;
+constexpr double kFastest_mps = 6.0;
+// A sighting is a part of the surface that came into free space: which part, differs by about the body's radius.
+constexpr double kGate_m = 1.2;
+constexpr double kGateGrows_mps = 1.5;
+constexpr double kPositionGain = 0.6;
+constexpr double kVelocityGain = 0.35;
+constexpr double kBody_m = 0.9;   // around the place that was seen
+constexpr double kTouch_m = 0.6;  // the same without a reserve
+// What constant velocity is wrong by: more while it was estimated from few sightings.
+constexpr double kGrows_mps = 0.25;
+constexpr double kGrowsAtFirst_mps = 0.8;
+constexpr double kGrowsBySightings_mps = 2.0;
+constexpr double kHeight_m = 3.0;  // a body may reach so far above and below what was seen of it
+constexpr double kStep_s = 0.1;
+
+Vector3 at_most(const Vector3& v_W, double most_mps) noexcept {
+  const double norm = v_W.norm();
+  return norm > most_mps ? Vector3(v_W * (most_mps / norm)) : v_W;
+}
+
+double level_m(const Vector3& way) noexcept { return core::hypot2(way.x(), way.y()); }
+
+}  // namespace
+
+bool BodyTracks::is_sure(const Track& track, MonotonicTime now) noexcept {
+  return track.sightings >= kSure && now - track.seen <= kLasts && track.v_W.norm() > kMoves_mps;
+}
+
+BodyTracks::Track* BodyTracks::continued_by(const Vector3& place_W, MonotonicTime now) noexcept {
+  Track* nearest = nullptr;
+  double nearest_m = 0.0;
+  for (Track& track : track_) {
+    const Nanos age = now - track.seen;
+    if (track.sightings == 0 || age > kLasts || age <= Nanos{0}) continue;
+    const double gate_m = kGate_m + kGateGrows_mps * seconds(age);
+    const double distance_m = (at_W(track, now) - place_W).norm();
+    if (distance_m > gate_m || (nearest != nullptr && distance_m >= nearest_m)) continue;
+    nearest = &track;
+    nearest_m = distance_m;
+  }
+  return nearest;
+}
+
+void BodyTracks::begin(const Vector3& place_W, MonotonicTime now) noexcept {
+  Track& oldest = *std::min_element(track_.begin(), track_.end(), [](const Track& a, const Track& b) {
+    return (a.sightings > 0 ? 1 : 0) < (b.sightings > 0 ? 1 : 0) ||
+           ((a.sightings > 0) == (b.sightings > 0) && a.seen < b.seen);
+  });
+  oldest = {place_W, Vector3::Zero(), now, 1};
+}
+
+void BodyTracks::observe(MonotonicTime now, std::span<const Vector3> places_W) noexcept {
+  for (const Vector3& place_W : places_W) {
+    // A part of a body that was followed to here already says nothing new.
+    const bool known = std::any_of(track_.begin(), track_.end(), [&](const Track& track) {
+      return track.sightings > 0 && track.seen == now && (track.p_W - place_W).norm() < 2.0 * kBody_m;
+    });
+    if (known) continue;
+    Track* track = continued_by(place_W, now);
+    if (track == nullptr) {
+      begin(place_W, now);
+      continue;
+    }
+    const double dt_s = seconds(now - track->seen);
+    const Vector3 expected_W = at_W(*track, now);
+    const Vector3 residual = place_W - expected_W;
+    const double gain = track->sightings == 1 ? 1.0 : kVelocityGain;
+    track->v_W = at_most(track->v_W + (gain / dt_s) * residual, kFastest_mps);
+    track->p_W = expected_W + (track->sightings == 1 ? 1.0 : kPositionGain) * residual;
+    track->seen = now;
+    ++track->sightings;
+  }
+}
+
+std::size_t BodyTracks::count(MonotonicTime now) const noexcept {
+  return static_cast<std::size_t>(
+      std::count_if(track_.begin(), track_.end(), [now](const Track& track) { return is_sure(track, now); }));
+}
+
+double BodyTracks::Meeting::score() const noexcept {
+  constexpr double kTouchesNot = 1000.0, kStands = 100.0, kOwnStand_mps = 0.2;
+  if (near_s == kNever) return kNever;
+  if (touch_s == kNever) return kTouchesNot + near_s;
+  return touch_s + (own_mps < kOwnStand_mps ? kStands : 0.0);
+}
+
+BodyTracks::Meeting BodyTracks::meets(const Trajectory& trajectory, MonotonicTime from, double radius_m,
+                                      double body_m) const noexcept {
+  Meeting meeting;
+  std::array<double, kMost> before_m{};
+  before_m.fill(kNever);
+  for (int i = 0; static_cast<double>(i) * kStep_s <= kHorizon_s; ++i) {
+    const double t_s = static_cast<double>(i) * kStep_s;
+    const MonotonicTime time = from + from_seconds(t_s);
+    const TrajectoryPoint at = trajectory.at(time);
+    for (std::size_t k = 0; k < kMost; ++k) {
+      const Track& track = track_[k];
+      if (!is_sure(track, from)) continue;
+      const Vector3 way = at_W(track, time) - at.p_W;
+      const double distance_m = level_m(way);
+      const bool nearer = distance_m < before_m[k];
+      before_m[k] = distance_m;
+      // The first look has nothing to compare with: the second one says whether they part.
+      if (i == 0 || !nearer || std::fabs(way.z()) > kHeight_m) continue;
+      const double grows_mps =
+          std::clamp(kGrowsBySightings_mps / track.sightings, kGrows_mps, kGrowsAtFirst_mps);
+      const double bound_m = radius_m + kBody_m + grows_mps * seconds(time - track.seen);
+      if (distance_m < bound_m && meeting.near_s == kNever) meeting.near_s = t_s;
+      if (distance_m >= body_m + kTouch_m) continue;
+      meeting.touch_s = t_s;
+      meeting.own_mps =
+          distance_m > 0.0 ? (at.v_W.x() * way.x() + at.v_W.y() * way.y()) / distance_m : level_m(at.v_W);
+      return meeting;
+    }
+  }
+  return meeting;
+}
+
+}  // namespace roborun::flight

@@ -1,0 +1,61 @@
+/// Where bodies that move near the vehicle will be: constant velocity, with bounds that grow.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <span>
+
+#include "core/geometry/vector.hpp"
+#include "core/trajectory.hpp"
+#include "firmware_if/time.hpp"
+
+namespace roborun::flight {
+
+/// A track is begun by a place where something appeared in free space, and counts once the same body was seen often enough
+/// and has moved: what is discovered late does not move on. RT-safe: O(tracks), no allocation.
+class BodyTracks {
+ public:
+  static constexpr std::size_t kMost = 12;
+  static constexpr double kHorizon_s = 4.0;  ///< Farther ahead a constant velocity says little.
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+
+  /// Places of one decision where surfaces were seen in space known to be free, at this instant. Beyond `kMost` bodies the
+  /// one that was not seen for longest is forgotten.
+  void observe(MonotonicTime now, std::span<const Vector3> places_W) noexcept;
+  /// Bodies whose motion is known at this instant.
+  [[nodiscard]] std::size_t count(MonotonicTime now) const noexcept;
+  struct Meeting {
+    double near_s{kNever};   ///< When it first comes nearer to a body than both bounds allow.
+    double touch_s{kNever};  ///< When both would touch, without bounds.
+    double own_mps{};        ///< Its own speed towards the body then.
+    /// What is better is more: +infinity if it keeps off; then what does not touch, what stands when it is touched, what
+    /// is touched later.
+    [[nodiscard]] double score() const noexcept;
+  };
+  /// How what flies this trajectory meets bodies, in seconds after `from`, while they approach each other, within the
+  /// horizon. The rest after the trajectory's end counts, too. Heights apart by more than a body may be high do not meet.
+  /// `radius_m` is planned with, `body_m` is the vehicle's own.
+  [[nodiscard]] Meeting meets(const Trajectory& trajectory, MonotonicTime from, double radius_m,
+                              double body_m) const noexcept;
+
+ private:
+  struct Track {
+    Vector3 p_W = Vector3::Zero();
+    Vector3 v_W = Vector3::Zero();
+    MonotonicTime seen{};
+    int sightings{0};
+  };
+  /// Where it is at this instant.
+  [[nodiscard]] static Vector3 at_W(const Track& track, MonotonicTime time) noexcept {
+    return track.p_W + seconds(time - track.seen) * track.v_W;
+  }
+  [[nodiscard]] static bool is_sure(const Track& track, MonotonicTime now) noexcept;
+  /// The track that this place continues, or null.
+  [[nodiscard]] Track* continued_by(const Vector3& place_W, MonotonicTime now) noexcept;
+  void begin(const Vector3& place_W, MonotonicTime now) noexcept;
+
+  std::array<Track, kMost> track_{};
+};
+
+}  // namespace roborun::flight

@@ -1,0 +1,137 @@
+// What a decision does among bodies that move: slower, waiting, aside.
+#include <array>
+#include <cmath>
+
+#include "platform/flight/decision_pipeline.hpp"
+#include "platform/flight/rest_of_budget.hpp"
+#include "stages/planning/fenced_view.hpp"
+
+namespace roborun::flight {
+namespace {
+
+constexpr std::array<double, 2> kSlower{0.5, 0.25};  // of the speed limit
+constexpr double kDodge_mps = 2.0;
+constexpr std::array<double, 2> kDodge_m{1.5, 3.0};
+constexpr double kDiagonal = 0.70710678118654752;
+constexpr std::array<std::array<double, 2>, 8> kDodgeWay{{{0, 1},
+                                                          {0, -1},
+                                                          {-1, 0},
+                                                          {1, 0},
+                                                          {-kDiagonal, kDiagonal},
+                                                          {-kDiagonal, -kDiagonal},
+                                                          {kDiagonal, kDiagonal},
+                                                          {kDiagonal, -kDiagonal}}};
+constexpr double kReact_s = 1.0;      // until the next decision has an answer
+constexpr std::uint64_t kLooks = 40;  // of one prediction, counted as so many lookups
+
+}  // namespace
+
+std::optional<Trajectory> DecisionPipeline::stop_before_body(const DecisionInput& in,
+                                                             const stages::MapView& known, core::Work& work,
+                                                             Nanos latency) const noexcept {
+  if (bodies_.count(in.now) == 0) return std::nullopt;
+  const MonotonicTime soonest = in.now + latency + config_.minor_frame;
+  const auto meets = [&](const Trajectory& trajectory) {
+    work.units += kLooks;
+    return bodies_.meets(trajectory, soonest, radius_m(), config_.vehicle.radius_m);
+  };
+  const BodyTracks::Meeting flown = meets(*in.committed);
+  const double speed_mps = in.committed->at(soonest).v_W.norm();
+  if (!(flown.near_s < kReact_s + speed_mps / config_.vehicle.acceleration_mps2)) return std::nullopt;
+  auto stop = stop_before(in, MonotonicTime::max(), known, work, latency);
+  if (!stop || !(meets(*stop).score() > flown.score())) return std::nullopt;
+  return stop;
+}
+
+void DecisionPipeline::dodge(const DecisionInput& in, core::StageBudget& budget, double& best_score,
+                             Trajectory& best) noexcept {
+  const stages::FencedView fenced(map_.view(), config_.fence);
+  const stages::FinestView finest(fenced);
+  double best_rest_m = BodyTracks::kNever;
+  for (const double distance_m : kDodge_m) {
+    for (const auto& way : kDodgeWay) {
+      const Vector3 end_W = draft_.start.p_W + distance_m * Vector3(way[0], way[1], 0.0);
+      const double rest_m = (in.goal_W - end_W).norm();
+      if (!config_.flight_bounds_W.contains(end_W)) continue;
+      const std::array<Vector3, 2> path_W{draft_.start.p_W, end_W};
+      stages::SmoothRequest request;
+      request.path_W = path_W;
+      request.start = draft_.start;
+      request.start_time = draft_.takes_over;
+      request.limits = limits(std::fmin(kDodge_mps, config_.vehicle.speed_mps));
+      request.radius_m = radius_m();
+      stages::SmoothResult smoothed;
+      RestOfBudget rest(budget, draft_.smoother_work);
+      const Status status = smoother_.smooth(request, finest, rest, smoothed);
+      draft_.smoother_work.units += smoothed.work.units;
+      if (status == Status::kBudgetSpent) return;
+      if (status != Status::kOk) continue;
+      draft_.smoother_work.units += kLooks;
+      const double score =
+          bodies_.meets(smoothed.trajectory, draft_.takes_over, radius_m(), config_.vehicle.radius_m).score();
+      const bool is_better =
+          score > best_score || (score == best_score && std::isinf(score) && rest_m < best_rest_m);
+      if (!is_better) continue;
+      best_score = score;
+      best_rest_m = rest_m;
+      best = smoothed.trajectory;
+    }
+  }
+}
+
+void DecisionPipeline::give_way(const DecisionInput& in, core::StageBudget& budget,
+                                DecisionOutput& out) noexcept {
+  if (in.climbing || bodies_.count(in.now) == 0) return;
+  const auto meets = [&](const Trajectory& trajectory) {
+    draft_.smoother_work.units += kLooks;
+    return bodies_.meets(trajectory, draft_.takes_over, radius_m(), config_.vehicle.radius_m);
+  };
+  const bool is_free = std::isinf(draft_.committed_until_s);
+  const BodyTracks::Meeting flown = meets(*in.committed);
+  draft_.replaces = !std::isinf(flown.near_s);
+  double best_score = -1.0;
+  Trajectory best;
+  // True: nothing can be better. Leaving known free space counts as touching.
+  const auto consider = [&](const Trajectory& trajectory, double free_s = BodyTracks::kNever) {
+    const double score = std::fmin(meets(trajectory).score(), free_s);
+    if (score > best_score) {
+      best_score = score;
+      best = trajectory;
+    }
+    return std::isinf(best_score);
+  };
+  meter_.charge_to(core::StageId::kSmoother);
+  bool done = out.smoother_status == Status::kOk && consider(draft_.trajectory);
+  if (done) return;
+  const double first_score = best_score;
+  core::StaticVector<double, 1 + kSlower.size()> speeds_mps;
+  if (out.planner_status != Status::kStartBlocked) {
+    // What is too fast to slow down in front of it may still pass it.
+    const double limit_mps = out.decision.point.speed_limit_mps, now_mps = draft_.start.v_W.norm();
+    if (out.smoother_status != Status::kOk && now_mps > limit_mps)
+      (void)speeds_mps.push_back(std::fmin(now_mps, config_.vehicle.speed_mps));
+    for (const double share : kSlower) (void)speeds_mps.push_back(share * limit_mps);
+  }
+  for (const double speed_mps : speeds_mps) {
+    if (done) break;
+    fit(budget, radius_m(), speed_mps, out);
+    done = out.smoother_status == Status::kOk && consider(draft_.trajectory);
+  }
+  Trajectory stop;
+  if (!done && smoother_.brake(draft_.start, draft_.takes_over, limits(config_.vehicle.acceleration_mps2),
+                               stop) == Status::kOk) {
+    const stages::FencedView fenced(map_.view(), config_.fence);
+    // Where what is flown touches a body sooner than the stop leaves free space, it is better than that.
+    const double free_s = free_until_s(stages::FinestView(fenced), stop, 0.0, config_.vehicle.radius_m,
+                                       draft_.smoother_work.units);
+    if (std::isinf(free_s) || free_s >= flown.touch_s) done = consider(stop, free_s);
+  }
+  if (!done) dodge(in, budget, best_score, best);
+  draft_.keeps = is_free && flown.score() >= best_score;
+  if (best_score < 0.0) return;
+  draft_.trajectory = best;
+  draft_.leaves &= best_score == first_score;
+  out.smoother_status = Status::kOk;
+}
+
+}  // namespace roborun::flight

@@ -1,0 +1,58 @@
+// What a vehicle that does not see all around does where no way is found: it looks, and steps back to see more.
+#include <algorithm>
+#include <array>
+
+#include "core/geometry/math.hpp"
+#include "platform/flight/decision_pipeline.hpp"
+
+namespace roborun::flight {
+namespace {
+
+constexpr Nanos kLookFirst{4'000'000'000};   // a half turn at 45 degrees a second
+constexpr Nanos kLookAgain{12'000'000'000};  // the same, and once round
+constexpr Nanos kSettles{500'000'000};       // images of the place where it has stepped back to
+constexpr double kStepBack_m = 3.0;
+constexpr double kStands_mps = 0.05;
+constexpr double kSlowly_mps = 1.0;
+constexpr double kHere_m = 0.3;  // nearer than that a direction means little
+constexpr std::size_t kCorners = 32;
+
+}  // namespace
+
+Vector3 DecisionPipeline::undecided_W(const DecisionInput& in) const noexcept {
+  std::array<Vector3, kCorners> way_W;
+  const std::size_t count =
+      ways_known_ ? ways_->known_way(draft_.start.p_W, config_.horizon_m, way_W) : std::size_t{0};
+  if (count == 0) return in.goal_W;
+  const Vector3 offset = way_W[count - 1] - draft_.start.p_W;
+  return core::hypot2(offset.x(), offset.y()) > kHere_m ? way_W[count - 1] : in.goal_W;
+}
+
+void DecisionPipeline::look_on(const DecisionInput& in, core::StageBudget& budget,
+                               DecisionOutput& out) noexcept {
+  const bool stands = draft_.start.v_W.norm() <= kStands_mps && !in.climbing;
+  if (out.smoother_status == Status::kOk || !stands) {
+    look_W_.reset();
+    return;
+  }
+  if (!look_W_) blocked_since_ = std::max(blocked_since_, in.now - kLookAgain + kLookFirst);
+  look_W_ = undecided_W(in);
+  if (in.now - blocked_since_ < kLookAgain) return;
+  blocked_since_ = in.now;
+  Vector3 away_W = draft_.start.p_W - *look_W_;
+  away_W.z() = 0.0;
+  const double far_m = core::hypot2(away_W.x(), away_W.y());
+  if (!(far_m > kHere_m)) return;
+  const double radius = slow_radius_m(config_.vehicle);
+  const Status planned = out.planner_status;
+  draft_.planner_work.volume_m3 = 0.0;
+  search_to(draft_.start.p_W + kStepBack_m / far_m * away_W, in, radius, out);
+  if (out.planner_status == Status::kOk) fit(budget, radius, kSlowly_mps, out);
+  if (out.smoother_status == Status::kOk)
+    back_until_ = draft_.trajectory.start_time + from_seconds(draft_.trajectory.duration_s()) + kSettles;
+  else
+    out.planner_status = planned;
+  kept_W_.clear();
+}
+
+}  // namespace roborun::flight

@@ -1,0 +1,140 @@
+#include "platform/live/guard.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <thread>
+
+#include "firmware_if/mavlink/receiver.hpp"
+#include "platform/input/input_error.hpp"
+#include "platform/live/obstacle_sectors.hpp"
+#include "platform/live/port_pictures.hpp"
+#include "platform/rt/monotonic_clock.hpp"
+
+namespace roborun::live {
+namespace {
+
+using namespace firmware_if::mavlink;  // NOLINT(google-build-using-namespace): messages by the dozen
+
+constexpr std::uint8_t kObstacleAvoidance = 196;  // MAV_COMP_ID
+constexpr Nanos kPeriod{100'000'000};
+constexpr Nanos kBeat{1'000'000'000};
+
+class Guard {
+ public:
+  explicit Guard(const GuardConfig& config)
+      : config_(config),
+        pictures_(sensor_port::VehiclePorts(config.link.name), config.rig, {clock_.epoch()}),
+        sectors_(config.rig.cameras.size(), config.band_m),
+        link_(*config.link.mavlink) {}
+
+  GuardReport run(const std::function<void(double, double)>& progress) {
+    GuardReport report;
+    const MonotonicTime begin = clock_.now();
+    for (;;) {
+      report.needs.clear();
+      pictures_.look(clock_.now(), report.needs);
+      report.ready = std::all_of(report.needs.begin(), report.needs.end(),
+                                 [](const Need& n) { return n.lacks.empty(); });
+      const bool over = (config_.stop && config_.stop()) || seconds(clock_.now() - begin) > config_.wait_s;
+      if (report.ready || over) break;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    if (!report.ready) return report;
+    report.nearest_m = std::numeric_limits<double>::infinity();
+    const MonotonicTime start = clock_.now();
+    MonotonicTime due = start, beat = start, told = start;
+    while (!(config_.stop && config_.stop()) && seconds(clock_.now() - start) < config_.seconds) {
+      const MonotonicTime now = clock_.now();
+      hear(now);
+      if (now >= due) {
+        due = std::max(due + kPeriod, now);
+        see();
+        send(sectors_.message(now), now, report);
+        const double nearest_m = sectors_.nearest_m(now);
+        report.nearest_m = std::min(report.nearest_m, nearest_m);
+        if (progress && now >= told) {
+          told = now + 2 * kPeriod;
+          progress(seconds(now - start), nearest_m);
+        }
+      }
+      if (now >= beat) {
+        beat += kBeat;
+        send(Heartbeat{18, 8, 0, 0, 4, 3}, now, report);
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    report.time_s = seconds(clock_.now() - start);
+    report.messages = messages_;
+    pictures_.use(clock_.now(), report.ports);
+    return report;
+  }
+
+ private:
+  void see() {
+    firmware_if::DepthFrame frame;
+    for (std::size_t i = 0; i < pictures_.cameras().size(); ++i)
+      if (pictures_.cameras()[i]->read(frame) == Status::kOk)
+        sectors_.see(i, frame, pictures_.cameras()[i]->mount());
+  }
+
+  /// The system that is guarded is that of the first autopilot; its clock's questions are answered.
+  void hear(MonotonicTime now) {
+    constexpr int kMost = 64;
+    std::size_t count = 0;
+    for (int i = 0; i < kMost && (count = link_.read(now, bytes_)) > 0; ++i) {
+      auto bytes = std::span<const std::uint8_t>(bytes_).first(count);
+      while (!bytes.empty()) {
+        bytes = bytes.subspan(receiver_.push(bytes));
+        Frame frame;
+        Event event = Event::kNothing;
+        while ((event = receiver_.next(frame)) != Event::kNothing)
+          if (event == Event::kFrame) take(now, frame);
+      }
+    }
+  }
+
+  void take(MonotonicTime now, const Frame& frame) {
+    constexpr std::uint8_t kAutopilot = 1, kInvalid = 8;
+    if (frame.header.compid != kAutopilot) return;
+    if (frame.msgid == kHeartbeat.id && sysid_ == 0 && unpack<Heartbeat>(frame.payload).autopilot != kInvalid)
+      sysid_ = frame.header.sysid;
+    if (frame.msgid != kTimesync.id || frame.header.sysid != sysid_) return;
+    const auto question = unpack<Timesync>(frame.payload);
+    GuardReport none;
+    if (question.tc1 == 0)
+      send(Timesync{now.time_since_epoch().count(), question.ts1, sysid_, kAutopilot}, now, none);
+  }
+
+  template <typename T>
+  void send(const T& message, MonotonicTime now, GuardReport& report) {
+    std::array<std::uint8_t, kMostFrame_bytes> frame{};
+    const auto length =
+        write_frame(T::kType, {seq_++, sysid_ != 0 ? sysid_ : std::uint8_t{1}, kObstacleAvoidance},
+                    pack(message), nullptr, frame);
+    const std::size_t left = link_.write(now, std::span<const std::uint8_t>(frame).first(length.value()));
+    if (left < length.value()) ++report.not_sent;
+    if (left == length.value() && T::kType.id == kObstacleDistance.id) ++messages_;
+  }
+
+  const GuardConfig& config_;
+  rt::MonotonicClock clock_;
+  PortPictures pictures_;
+  ObstacleSectors sectors_;
+  mavlink::Link link_;
+  Receiver receiver_;
+  std::array<std::uint8_t, 4096> bytes_{};
+  std::uint8_t seq_{0}, sysid_{0};
+  std::uint64_t messages_{0};
+};
+
+}  // namespace
+
+GuardReport run_guard(const GuardConfig& config,
+                      const std::function<void(double time_s, double nearest_m)>& progress) {
+  if (config.rig.cameras.empty()) throw InputError("--vehicle: has no camera: a guard needs depth images");
+  Guard guard(config);
+  return guard.run(progress);
+}
+
+}  // namespace roborun::live

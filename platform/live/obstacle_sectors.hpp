@@ -1,0 +1,47 @@
+/// Depth images as distances around the vehicle, as MAVLink's OBSTACLE_DISTANCE has them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "firmware_if/depth_camera.hpp"
+#include "firmware_if/mavlink/flight_messages.hpp"
+
+namespace roborun::live {
+
+/// 72 sectors of 5 degrees, clockwise; the middle of the first one is straight ahead. What lies within `band_m` above or below the
+/// body's middle counts, in the body's own axes (a vehicle that leans sees the ground as an obstacle). A sector holds the nearest
+/// hit; it is free only if a level ray (3 degrees) of it found nothing within the range and none of them said nothing; else
+/// it is not known.
+class ObstacleSectors {
+ public:
+  static constexpr std::size_t kSectors = 72;
+  static constexpr std::uint16_t kUnknown = 65535;
+  static constexpr Nanos kOld{500'000'000};  ///< An image; then what it showed is not known.
+
+  ObstacleSectors(std::size_t cameras, double band_m) : camera_(cameras), band_m_(band_m) {}
+  /// The newest image of a camera.
+  void see(std::size_t camera, const firmware_if::DepthFrame& frame, const firmware_if::CameraMount& mount);
+  /// As it is to be sent at `now`; ranges are the least far of the cameras. Body frame (12), right for PX4 and ArduPilot.
+  [[nodiscard]] firmware_if::mavlink::ObstacleDistance message(MonotonicTime now) const;
+  /// The nearest hit at `now`, m; +infinity: none.
+  [[nodiscard]] double nearest_m(MonotonicTime now) const;
+
+ private:
+  struct Sector {
+    float hit_m{};  ///< +infinity: none.
+    bool free{}, silent{};
+  };
+  struct Camera {
+    MonotonicTime stamp = MonotonicTime::min();
+    double range_min_m{}, range_m{};
+    std::array<Sector, kSectors> sector{};
+  };
+  [[nodiscard]] Sector merged(std::size_t index, MonotonicTime now) const;
+
+  std::vector<Camera> camera_;
+  double band_m_;
+};
+
+}  // namespace roborun::live

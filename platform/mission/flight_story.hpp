@@ -1,0 +1,29 @@
+/// A flight log read as the story of one flight: what `roborun report` draws.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "platform/report/flight_page.hpp"
+#include "platform/report/svg_plot.hpp"
+
+namespace roborun::mission {
+
+struct FlightStory {
+  report::FlightPage page;
+  std::string damage;  ///< Empty, or one line: where the log ends early, and why. The story goes until there.
+};
+
+/// The true world as it is at the height of its start; no log holds it. `seed`: of the flight, if the log says it.
+using WorldOf = std::function<report::Scene(std::optional<std::uint64_t> seed)>;
+
+inline constexpr std::size_t kMostStates = 12000;
+inline constexpr std::size_t kMostSlices = 600;
+/// Reads a log of any length: states and slices of the map are thinned to at most kMostStates and kMostSlices, messages out of
+/// order are left out and counted. `world` may be empty. Throws InputError for what cannot be read, is no flight log, or holds a
+/// message that is not as platform/log/README.md says, and for a world whose bounds, start or goal are not the flight's.
+[[nodiscard]] FlightStory story_of(const std::string& path, const WorldOf& world = {});
+
+}  // namespace roborun::mission

@@ -1,0 +1,174 @@
+// The page: one moment, chosen by slider, keys, charts or events, and everything drawn for it.
+
+const $ = id => document.getElementById(id);
+
+async function read_story() {
+  const bytes = Uint8Array.from(atob($('story').textContent.trim()), c => c.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'));
+  return JSON.parse(await new Response(stream).text());
+}
+
+function read_theme() {
+  const style = getComputedStyle(document.documentElement), theme = {};
+  for (const name of ['paper', 'ink', 'quiet', 'line', 'panel', 'blue', 'orange', 'green', 'red', 'sky', 'pink', 'free', 'known'])
+    theme[name] = style.getPropertyValue(`--${name}`).trim();
+  theme.dark = parseInt(theme.paper.slice(1, 3), 16) < 128;
+  return theme;
+}
+
+/** What there is to draw over time. A chart without a value is left out. */
+function charts_of(story, axis, choose) {
+  const d = story.decision, s = story.state, parent = $('charts');
+  const of = (from, name, values, colour, dash, step) => ({ name, times: from.time_s, values, colour, dash, step });
+  const stages = [['point_cloud', 'sky'], ['governor', 'quiet'], ['map', 'blue'], ['export', 'green'], ['planner', 'orange'], ['smoother', 'pink']];
+  const list = [
+    new Chart(parent, axis, { title: 'Speed', unit: 'm/s', series: [
+      of(s, 'flown', s.speed_mps, 'blue'), of(s, 'reference', s.ref_speed_mps, 'green', [3, 3]),
+      of(d, 'limit', d.speed_limit_mps, 'red', [8, 4], true)] }, choose),
+    new Chart(parent, axis, { title: 'Latency by stage, against the deadline', unit: 's',
+      stack: stages.map(([name, colour]) => of(d, name.replace('_', ' '), d[`${name}_s`], colour)),
+      series: [of(d, 'deadline', d.deadline_s, 'red', [8, 4], true)] }, choose),
+    new Chart(parent, axis, { title: 'Precision', unit: 'm', logarithmic: true, series: [
+      of(d, 'map p0', d.p0_m, 'blue', [], true), of(d, 'plan p1', d.p1_m, 'orange', [6, 3], true),
+      of(d, 'asked for', d.demand_m, 'quiet', [2, 3], true)] }, choose),
+    new Chart(parent, axis, { title: 'Volume', unit: '1000 m\u00b3', series: [['perceived v0', 'v0_m3', 'blue', []], ['exported v1', 'v1_m3', 'green', [6, 3]],
+      ['planned v2', 'v2_m3', 'orange', [2, 3]]].map(([name, key, colour, dash]) =>
+        of(d, name, d[key].map(v => v === null ? null : v / 1000), colour, dash, true)) }, choose),
+    new Chart(parent, axis, { title: 'Battery', unit: '%', most: 100, series: [
+      of(s, 'left', s.battery_ratio.map(v => v === null ? null : 100 * v), 'green')] }, choose),
+    new Bands(parent, axis, { title: 'Failsafe and events', marks: story.events.map(e => e.time_s), bands: bands_of(story, axis) }, choose)];
+  return list.filter(chart => { if (chart.empty) chart.box.remove(); return !chart.empty; });
+}
+
+/** What the flight did from one moment to the next: its phases, and from each action of the failsafe on that action and why. */
+function bands_of(story, axis) {
+  const s = story.state, colours = { hold: 'sky', return: 'orange', land: 'orange', terminate: 'red', kill: 'red' }, starts = [];
+  s.phase.forEach((phase, i) => {
+    if (phase && phase !== s.phase[i - 1]) starts.push({ name: phase, from: s.time_s[i], colour: colours[phase] || 'green' });
+  });
+  for (const f of story.failsafe) starts.push({ name: words_of_failsafe(f), from: f.time_s, colour: colours[f.action] || 'green' });
+  starts.sort((a, b) => a.from - b.from);
+  // A phase that an action began has its band already.
+  const bands = starts.filter((b, i) => i === 0 || !(starts[i - 1].name.startsWith(b.name) && b.from - starts[i - 1].from < 0.5));
+  bands.forEach((b, i) => { b.until = bands[i + 1]?.from ?? axis.until; });
+  return bands;
+}
+
+function words_of_failsafe(f) {
+  const because = f.conditions.concat(f.sensor ? [f.sensor] : []).join(', ');
+  return `${f.action}${f.phase ? ` (${f.phase})` : ''}${because ? `: ${because}` : ''}`;
+}
+
+class Page {
+  constructor(story) {
+    this.story = story;
+    const times = story.state.time_s.concat(story.decision.time_s, story.failsafe.map(f => f.time_s), story.events.map(e => e.time_s));
+    const ends = times.reduce(([a, b], t) => [Math.min(a, t), Math.max(b, t)], [Infinity, -Infinity]);
+    this.axis = new TimeAxis(...ends);
+    const choose = t => this.go(t);
+    this.scene = new Scene($('scene'), story);
+    this.charts = charts_of(story, this.axis, choose);
+    Object.assign($('time'), { min: this.axis.from, max: this.axis.until });
+    for (const [name, value] of story.facts) {
+      const row = document.createElement('div');
+      row.append(Object.assign(document.createElement('dt'), { textContent: name }), Object.assign(document.createElement('dd'), { textContent: value }));
+      $('facts').append(row);
+    }
+    $('note').textContent = story.notes.join('\n');
+    this.list_events();
+    this.listen();
+    this.t = this.axis.from;
+    this.repaint();
+  }
+  list_events() {
+    const rows = this.story.events.map(e => [e.time_s, e.text, '']).concat(this.story.failsafe.map(f => [f.time_s, `failsafe: ${f.action}`,
+      [f.phase, ...f.conditions, f.sensor].filter(Boolean).join(', ')])).sort((a, b) => a[0] - b[0]);
+    this.rows = rows.map(([time, what, more]) => {
+      const row = document.createElement('tr');
+      for (const text of [`${time.toFixed(2)} s`, what, more]) row.append(Object.assign(document.createElement('td'), { textContent: text }));
+      row.addEventListener('click', () => this.go(time));
+      $('events').append(row);
+      return { time, row };
+    });
+    $('happened').hidden = rows.length === 0;
+  }
+  listen() {
+    $('time').addEventListener('input', () => this.go(Number($('time').value)));
+    for (const [id, yaw, pitch] of [['top', 0, Math.PI / 2], ['side', 0, 0.08], ['slant', -0.55, 0.75]])
+      $(id).addEventListener('click', () => { this.scene.look_from(yaw, pitch); this.draw(); });
+    $('follow').addEventListener('change', () => { this.scene.follow_closely($('follow').checked); this.draw(); });
+    $('play').addEventListener('click', () => this.play(!this.playing));
+    document.addEventListener('keydown', e => this.key(e));
+    const repaint = () => this.repaint();
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', repaint);
+    matchMedia('print').addEventListener('change', repaint);
+    window.addEventListener('beforeprint', repaint);
+    window.addEventListener('afterprint', repaint);
+    window.addEventListener('resize', () => this.draw());
+  }
+  key(e) {
+    if (e.ctrlKey || e.altKey || e.metaKey || (e.key === ' ' && (e.target.tagName === 'BUTTON' || e.target.type === 'checkbox'))) return;
+    const turn = { ArrowLeft: -1, ArrowRight: 1 }[e.key];
+    if (turn) this.go(e.shiftKey ? this.t + 10 * turn : this.beside(turn));
+    else if (e.key === 'Home') this.go(this.axis.from);
+    else if (e.key === 'End') this.go(this.axis.until);
+    else if (e.key === ' ') this.play(!this.playing);
+    else return;
+    e.preventDefault();
+  }
+  /** The decision before (-1) or behind (1) this moment. */
+  beside(turn) {
+    const times = this.story.decision.time_s, at = index_at(times, this.t + 1e-6);
+    if (turn > 0) return times[at + 1] ?? this.axis.until;
+    return at >= 0 && times[at] < this.t - 1e-6 ? times[at] : times[at - 1] ?? this.axis.from;
+  }
+  play(on) {
+    this.playing = on;
+    $('play').setAttribute('aria-pressed', on); $('play').textContent = on ? 'Pause' : 'Play';
+    let before = performance.now();
+    const frame = now => {
+      if (!this.playing) return;
+      // A minute for a flight of any length, and never slower than the flight was.
+      const rate = Math.max(1, (this.axis.until - this.axis.from) / 60);
+      const t = this.t + rate * (now - before) / 1000;
+      before = now;
+      this.go(t);
+      if (t >= this.axis.until) this.play(false); else requestAnimationFrame(frame);
+    };
+    if (on && this.t >= this.axis.until) this.t = this.axis.from;
+    if (on) requestAnimationFrame(frame);
+  }
+  go(t) {
+    this.t = Math.min(this.axis.until, Math.max(this.axis.from, t));
+    $('time').value = this.t;
+    this.draw();
+  }
+  repaint() { this.theme = read_theme(); this.legend(); this.draw(); }
+  legend() {
+    const theme = this.theme, line = (colour, words) => `<i style="border-color:${colour}"></i>${words}`;
+    const box = (colour, words) => `<i class="box" style="background:${colour}"></i>${words}`;
+    $('legend').innerHTML = line(speed_colour(0, theme), 'flown, slow') + line(speed_colour(1, theme), `flown, ${this.scene.top_speed.toFixed(1)} m/s`) +
+      line(theme.red, 'planned') + (this.story.map.length ? box(theme.free, 'known to be free') + box(theme.known, 'known to be occupied, at its height then') : '') +
+      (this.story.world ? line(theme.quiet, 'what truly stands there') : '');
+  }
+  draw() {
+    const d = this.story.decision, s = this.story.state, at = index_at(d.time_s, this.t + 1e-6), now = Math.max(0, index_at(s.time_s, this.t));
+    $('clock').textContent = `${this.t.toFixed(2)} s`;
+    $('when').textContent = at < 0 ? 'Before the first decision' : `Decision ${at + 1} of ${d.time_s.length}, ${d.time_s[at].toFixed(2)} s`;
+    $('doing').textContent = `at (${[s.x_m, s.y_m, s.z_m].map(v => v[now].toFixed(1)).join(', ')}) m, ${s.speed_mps[now].toFixed(1)} m/s` +
+      (s.phase[now] ? `, ${s.phase[now]}` : '');
+    $('why').textContent = at < 0 ? 'Nothing was decided yet.' : d.why[at] || 'The log holds no reasons.';
+    this.scene.draw(this.t, this.theme, $('follow').checked);
+    for (const chart of this.charts) chart.draw(this.t, this.theme);
+    const last = this.rows.findLast(r => r.time <= this.t + 1e-6);
+    for (const r of this.rows) r.row.classList.toggle('now', r === last);
+  }
+}
+
+read_story().then(story => {
+  window.page = new Page(story);
+  document.documentElement.dataset.ready = 'yes';
+}).catch(error => {
+  $('note').textContent = `This page cannot be drawn: ${error.message}. It needs a browser of 2023 or newer.`;
+  throw error;
+});

@@ -1,0 +1,317 @@
+#include "stages/planning/curve.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace roborun::stages {
+namespace {
+
+constexpr double kAtRest = 1e-6;   // m/s and m/s2
+constexpr double kShort_s = 1e-9;  // no segment
+constexpr double kSlack_m = 1e-9;
+constexpr double kHere_m = 0.05;  // a stop that ends so near to the last point has reached it
+constexpr int kHalvings = 20;     // of a speed: 6 m/s to 6e-6
+constexpr int kBeginHalvings = 10;
+// Rounds for the direction after the first change, and how near it comes: while the speed is looked for, and then.
+struct Aim {
+  int rounds;
+  double error;
+};
+constexpr Aim kRough{12, 1e-4};
+constexpr Aim kExact{40, 1e-10};
+
+/// The highest speed up to `most_mps` for which `fits` holds, if it holds for all lower ones. 0 if for none.
+template <typename Fits>
+double highest_mps(double most_mps, const Fits& fits, int halvings = kHalvings) noexcept {
+  if (fits(most_mps)) return most_mps;
+  double low = 0.0, high = most_mps;
+  for (int i = 0; i < halvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    (fits(middle) ? low : high) = middle;
+  }
+  return low;
+}
+
+/// A straight piece between two points of the course.
+struct Leg {
+  Vector3 direction = Vector3::Zero();
+  double length_m{};
+  double limit_mps{};
+};
+
+/// The change at the start, up to where the first leg begins.
+struct Beginning {
+  Vector3 v_W = Vector3::Zero();
+  double speed_mps{};
+  Leg leg{};  ///< What is left of the first one.
+};
+
+class Fitter {
+ public:
+  Fitter(const Course& course, const MotionLimits& limits, Trajectory& out, SegmentParts& part) noexcept
+      : course_(course),
+        limits_(limits),
+        change_{limits.acceleration_mps2, limits.jerk_mps3},
+        faster_{std::min(limits.acceleration_mps2, limits.speeding_up_mps2), limits.jerk_mps3},
+        out_(out),
+        part_(part) {}
+
+  CurveFit fit(const TrajectoryPoint& start) noexcept;
+
+ private:
+  static constexpr std::size_t kMaxPoints = Course::kMaxPoints;
+
+  [[nodiscard]] Leg leg_between(const Vector3& from_W, const Vector3& to_W) const noexcept;
+  /// What a turn at corner i takes of both legs.
+  [[nodiscard]] double turn_m(std::size_t i, double speed_mps) const noexcept {
+    return 0.5 * speed_mps * change_s(speed_mps * bend_[i], change_);
+  }
+  void measure_bend(std::size_t i) noexcept { bend_[i] = (leg_[i].direction - leg_[i - 1].direction).norm(); }
+  void limit_vertical() noexcept;
+  void limit_corners() noexcept;
+  void limit_backwards() noexcept;
+  void limit_forwards() noexcept;
+  [[nodiscard]] bool begin(const TrajectoryPoint& start) noexcept;
+  /// Where the first change to this speed leads. False if the corner after it cannot be flown from there.
+  [[nodiscard]] bool leads_on(const TrajectoryPoint& start, double speed_mps, const Aim& aim,
+                              Beginning& out) const noexcept;
+  [[nodiscard]] ChangeLimits first_change(const TrajectoryPoint& start, const Vector3& v_W) const noexcept;
+  [[nodiscard]] bool add(const VelocityChange& change, std::size_t part) noexcept;
+  [[nodiscard]] bool add(const VelocityChange::Piece& piece, std::size_t part) noexcept;
+  [[nodiscard]] bool add_change(const Vector3& v_W, const ChangeLimits& limits, std::size_t part) noexcept;
+  [[nodiscard]] CurveFit add_leg(std::size_t i) noexcept;
+  [[nodiscard]] CurveFit add_all() noexcept;
+
+  const Course& course_;
+  const MotionLimits& limits_;
+  ChangeLimits change_;  ///< Braking, and turns.
+  ChangeLimits faster_;  ///< Where the speed goes up.
+  Trajectory& out_;
+  SegmentParts& part_;
+  TrajectoryPoint at_;  ///< Where the curve is so far.
+  double now_s_{};
+  std::size_t count_{};  ///< Points.
+  Vector3 from_W_ = Vector3::Zero();
+  std::array<Leg, kMaxPoints> leg_;
+  std::array<double, kMaxPoints> bend_{};   ///< Change of direction at a corner: the norm of the difference.
+  std::array<double, kMaxPoints> speed_{};  ///< At the points.
+};
+
+Leg Fitter::leg_between(const Vector3& from_W, const Vector3& to_W) const noexcept {
+  Leg leg;
+  const Vector3 way = to_W - from_W;
+  leg.length_m = way.norm();
+  leg.direction = leg.length_m > 0.0 ? Vector3(way / leg.length_m) : Vector3::Zero();
+  const double vertical_mps = way.z() > 0.0 ? limits_.climb_mps : limits_.descent_mps;
+  const double rise = std::fabs(leg.direction.z());
+  leg.limit_mps = rise * limits_.speed_mps > vertical_mps ? vertical_mps / rise : limits_.speed_mps;
+  return leg;
+}
+
+/// One acceleration for the whole course, so that its steepest leg and the most upright of its turns keep the vertical
+/// limit. Turns that hardly climb or sink differently than before are too short to matter.
+void Fitter::limit_vertical() noexcept {
+  constexpr double kHardly = 0.05;
+  const auto limit = [&](const Vector3& way) {
+    const double rise = std::fabs(way.z());
+    if (rise * change_.acceleration_mps2 > limits_.vertical_mps2 * way.norm() && rise > kHardly)
+      change_.acceleration_mps2 = limits_.vertical_mps2 * way.norm() / rise;
+  };
+  for (std::size_t i = 0; i + 1 < count_; ++i) {
+    limit(leg_[i].direction);
+    if (i > 0) limit(leg_[i].direction - leg_[i - 1].direction);
+  }
+  faster_.acceleration_mps2 = std::min(faster_.acceleration_mps2, change_.acceleration_mps2);
+}
+
+/// Speeds at the corners for which both turns of a leg find room on it. Where they do not at the speeds that the
+/// limits allow, each gets its part of the leg.
+void Fitter::limit_corners() noexcept {
+  std::array<double, kMaxPoints> wanted_m{};
+  for (std::size_t i = 1; i + 1 < count_; ++i) {
+    measure_bend(i);
+    speed_[i] = course_.share[i] > 0.0 ? std::min(leg_[i - 1].limit_mps, leg_[i].limit_mps) : 0.0;
+    wanted_m[i] = turn_m(i, speed_[i]);
+  }
+  const auto room_m = [&](std::size_t leg, std::size_t i, std::size_t other) {
+    const double both_m = wanted_m[i] + wanted_m[other];
+    return both_m > leg_[leg].length_m ? leg_[leg].length_m * wanted_m[i] / both_m : wanted_m[i];
+  };
+  for (std::size_t i = 1; i + 1 < count_; ++i) {
+    const double most_m = course_.share[i] * std::min(room_m(i - 1, i, i - 1), room_m(i, i, i + 1));
+    speed_[i] = highest_mps(speed_[i], [&](double v) { return turn_m(i, v) <= most_m; });
+  }
+  speed_[count_ - 1] = 0.0;
+}
+
+/// No faster than what can be braked to the next point's speed.
+void Fitter::limit_backwards() noexcept {
+  for (std::size_t i = count_ - 1; i-- > 1;) {
+    const double left_m = leg_[i].length_m - turn_m(i + 1, speed_[i + 1]);
+    speed_[i] = highest_mps(speed_[i], [&](double v) {
+      return turn_m(i, v) + (v > speed_[i + 1] ? change_m(v, speed_[i + 1], change_) : 0.0) <= left_m;
+    });
+  }
+}
+
+/// No faster than what can be reached from the point before. Never slower than there: the least difference takes a way
+/// of its own.
+void Fitter::limit_forwards() noexcept {
+  for (std::size_t i = 1; i + 1 < count_; ++i) {
+    const double before_mps = speed_[i - 1];
+    if (speed_[i] <= before_mps) continue;
+    const double left_m = leg_[i - 1].length_m - (i > 1 ? turn_m(i - 1, before_mps) : 0.0);
+    speed_[i] = before_mps + highest_mps(speed_[i] - before_mps, [&](double more) {
+                  const double v = before_mps + more;
+                  return turn_m(i, v) + change_m(before_mps, v, faster_) <= left_m;
+                });
+  }
+}
+
+/// What is up or down of it keeps the vertical limit, like legs and turns.
+ChangeLimits Fitter::first_change(const TrajectoryPoint& start, const Vector3& v_W) const noexcept {
+  ChangeLimits limits = v_W.norm() > start.v_W.norm() ? faster_ : change_;
+  const Vector3 delta = v_W - start.v_W;
+  const double rise = std::fabs(delta.z()), length = delta.norm();
+  if (rise * limits.acceleration_mps2 > limits_.vertical_mps2 * length)
+    limits.acceleration_mps2 = limits_.vertical_mps2 * length / rise;
+  return limits;
+}
+
+/// The direction of the leg depends on where the change ends, and that on the direction: a few rounds.
+bool Fitter::leads_on(const TrajectoryPoint& start, double speed_mps, const Aim& aim,
+                      Beginning& out) const noexcept {
+  const Vector3& to_W = course_.point_W[1];
+  Vector3 direction = leg_[0].direction;
+  bool aimed = false;
+  for (int i = 0; i < aim.rounds && !aimed; ++i) {
+    out.v_W = speed_mps * direction;
+    const VelocityChange change(start, out.v_W, first_change(start, out.v_W));
+    out.leg = leg_between(start.p_W + change.way_W(), to_W);
+    aimed = (out.leg.direction - direction).squaredNorm() < aim.error * aim.error;
+    direction = out.leg.direction;
+  }
+  out.speed_mps = speed_mps;
+  const Vector3 flown = speed_mps > kAtRest ? Vector3(out.v_W / speed_mps) : direction;
+  if (!aimed && !((direction - flown).norm() < kRough.error)) return false;
+  if (speed_mps > out.leg.limit_mps * 1.0000001) return false;
+  const double next_mps = speed_[1];
+  if (count_ == 2) return change_m(speed_mps, 0.0, change_) <= out.leg.length_m + kSlack_m;
+  const double bend = (leg_[1].direction - direction).norm();
+  const double least_mps = std::min(next_mps, speed_mps);
+  const double turn_m = 0.5 * least_mps * change_s(least_mps * bend, change_);
+  return turn_m + change_m(speed_mps, least_mps, change_) <= out.leg.length_m + kSlack_m;
+}
+
+bool Fitter::begin(const TrajectoryPoint& start) noexcept {
+  Beginning beginning;
+  const auto fits = [&](double v) { return leads_on(start, v, kRough, beginning); };
+  const double most_mps = course_.start_share * std::max(leg_[0].limit_mps, 0.0);
+  const double speed_mps = highest_mps(most_mps, fits, kBeginHalvings);
+  if (!leads_on(start, speed_mps, kExact, beginning) && !fits(speed_mps)) return false;
+  if (!add_change(beginning.v_W, first_change(start, beginning.v_W), 0)) return false;
+  leg_[0] = beginning.leg;
+  speed_[0] = beginning.speed_mps;
+  if (speed_[0] > kAtRest) leg_[0].direction = beginning.v_W / speed_[0];
+  if (count_ > 2) {
+    // From where the first leg ends: where no direction settles, a tenth of a millimetre per metre beside the corner.
+    leg_[1] = leg_between(at_.p_W + leg_[0].length_m * leg_[0].direction, course_.point_W[2]);
+    measure_bend(1);
+  }
+  return true;
+}
+
+bool Fitter::add(const VelocityChange::Piece& piece, std::size_t part) noexcept {
+  if (piece.duration_s < kShort_s) return true;
+  if (out_.segment_count == Trajectory::kMaxSegments) return false;
+  part_[out_.segment_count] = static_cast<std::uint8_t>(part);
+  PolynomialSegment& segment = out_.segment[out_.segment_count++];
+  segment = {};
+  segment.duration_s = piece.duration_s;
+  segment.coefficient[0] = at_.p_W;
+  segment.coefficient[1] = at_.v_W;
+  segment.coefficient[2] = 0.5 * at_.a_W;
+  segment.coefficient[3] = piece.jerk_W / 6.0;
+  at_ = after(at_, piece);
+  now_s_ += piece.duration_s;
+  return true;
+}
+
+bool Fitter::add(const VelocityChange& change, std::size_t part) noexcept {
+  for (const VelocityChange::Piece& piece : change.pieces())
+    if (!add(piece, part)) return false;
+  return true;
+}
+
+bool Fitter::add_change(const Vector3& v_W, const ChangeLimits& limits, std::size_t part) noexcept {
+  if (!add(VelocityChange(at_, v_W, limits), part)) return false;
+  at_.v_W = v_W;  // not what rounding left of it
+  at_.a_W.setZero();
+  return true;
+}
+
+/// Up to a peak, on, and down to the speed of the turn that follows.
+CurveFit Fitter::add_leg(std::size_t i) noexcept {
+  const Leg& leg = leg_[i];
+  const double from_mps = speed_[i], to_mps = speed_[i + 1];
+  const double turns_m = (i > 0 ? turn_m(i, from_mps) : 0.0) + (i + 2 < count_ ? turn_m(i + 1, to_mps) : 0.0);
+  const double length_m = leg.length_m - turns_m;
+  const auto way_m = [&](double peak) {
+    return change_m(from_mps, peak, faster_) + change_m(peak, to_mps, change_);
+  };
+  const double least_mps = std::max(from_mps, to_mps);
+  if (way_m(least_mps) > length_m + 1e-6) return CurveFit::kTooFast;
+  const double more_mps = highest_mps(std::max(leg.limit_mps - least_mps, 0.0),
+                                      [&](double more) { return way_m(least_mps + more) <= length_m; });
+  const double peak_mps = least_mps + more_mps;
+  const std::size_t straight = 2 * i + 1;
+  bool room = add_change(peak_mps * leg.direction, faster_, straight);
+  const double cruise_m = length_m - way_m(peak_mps);
+  if (peak_mps > kAtRest && cruise_m > 0.0)
+    room = room && add({Vector3::Zero(), cruise_m / peak_mps}, straight);
+  out_.brake_begin_s = now_s_;
+  room = room && add_change(to_mps * leg.direction, change_, straight);
+  if (i + 2 < count_) room = room && add_change(to_mps * leg_[i + 1].direction, change_, straight + 1);
+  return room ? CurveFit::kOk : CurveFit::kTooManyPoints;
+}
+
+CurveFit Fitter::add_all() noexcept {
+  for (std::size_t i = 0; i + 1 < count_; ++i) {
+    const CurveFit fit = add_leg(i);
+    if (fit != CurveFit::kOk) return fit;
+  }
+  return CurveFit::kOk;
+}
+
+CurveFit Fitter::fit(const TrajectoryPoint& start) noexcept {
+  out_.segment_count = 0;
+  out_.brake_begin_s = 0.0;
+  at_ = start;
+  count_ = course_.point_W.size();
+  if (course_.start_share <= 0.0) {
+    if (!add_change(Vector3::Zero(), change_, 0)) return CurveFit::kTooManyPoints;
+    if (count_ == 2 && (course_.point_W[1] - at_.p_W).norm() < kHere_m) return CurveFit::kOk;
+  }
+  from_W_ = at_.p_W;
+  leg_[0] = leg_between(from_W_, course_.point_W[1]);
+  for (std::size_t i = 1; i + 1 < count_; ++i)
+    leg_[i] = leg_between(course_.point_W[i], course_.point_W[i + 1]);
+  limit_vertical();
+  limit_corners();
+  limit_backwards();
+  if (at_.v_W.norm() < kAtRest && at_.a_W.norm() < kAtRest)
+    speed_[0] = 0.0;
+  else if (!begin(at_))
+    return CurveFit::kTooFast;
+  limit_forwards();
+  return add_all();
+}
+
+}  // namespace
+
+CurveFit fit_curve(const Course& course, const TrajectoryPoint& start, const MotionLimits& limits,
+                   Trajectory& out, SegmentParts& part) noexcept {
+  return Fitter(course, limits, out, part).fit(start);
+}
+
+}  // namespace roborun::stages

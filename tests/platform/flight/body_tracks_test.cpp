@@ -1,0 +1,112 @@
+#include "platform/flight/body_tracks.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "core/random/counter_rng.hpp"
+#include "tests/support/no_alloc_scope.hpp"
+
+namespace roborun::flight {
+namespace {
+
+constexpr double kPlanned_m = 0.9;
+constexpr double kOwn_m = 0.6;
+
+MonotonicTime at_s(double time_s) { return MonotonicTime{from_seconds(time_s)}; }
+
+void see(BodyTracks& sut, double time_s, const Vector3& p_W) {
+  const std::array<Vector3, 1> place_W{p_W};
+  sut.observe(at_s(time_s), place_W);
+}
+
+/// Seen every 0.2 s up to `until_s`, crossing from the right at 2 m/s; in front of (10, 0) after 5 s.
+Vector3 crosser_W(double time_s) { return {10.0, -10.0 + 2.0 * time_s, 3.0}; }
+BodyTracks crossing_until(double until_s) {
+  BodyTracks sut;
+  for (double t = 0.0; t <= until_s + 1e-9; t += 0.2) see(sut, t, crosser_W(t));
+  return sut;
+}
+
+/// Straight along x at this speed, through (x0, 0, 3) at time zero.
+Trajectory straight(double x0_m, double speed_mps) {
+  Trajectory t;
+  t.start_time = at_s(0.0);
+  t.segment_count = 1;
+  t.segment[0].duration_s = 60.0;
+  t.segment[0].coefficient[0] = Vector3(x0_m, 0, 3);
+  t.segment[0].coefficient[1] = Vector3(speed_mps, 0, 0);
+  return t;
+}
+
+TEST(BodyTracks, KnowNothingFromOneLookOrFromWhatStands) {
+  BodyTracks sut;
+  see(sut, 0.0, {5, 0, 3});
+  EXPECT_EQ(sut.count(at_s(0.0)), 0U);
+  core::CounterRng rng(3);
+  // The same surface discovered late, a little beside itself each time.
+  for (double t = 0.2; t < 3.0; t += 0.2)
+    see(sut, t, {5.0 + rng.uniform(-0.05, 0.05), rng.uniform(-0.05, 0.05), 3});
+  EXPECT_EQ(sut.count(at_s(3.0)), 0U);
+  EXPECT_EQ(sut.meets(straight(0.0, 1.0), at_s(3.0), kPlanned_m, kOwn_m).near_s, BodyTracks::kNever);
+}
+
+TEST(BodyTracks, PredictWhereABodyCrosses) {
+  const BodyTracks sut = crossing_until(2.0);
+  ASSERT_EQ(sut.count(at_s(2.0)), 1U);
+  // At 2 m/s through the origin: both are at (10, 0) after 5 s, 3 s from now.
+  const BodyTracks::Meeting meeting = sut.meets(straight(0.0, 2.0), at_s(2.0), kPlanned_m, kOwn_m);
+  EXPECT_NEAR(meeting.touch_s, 3.0 - 1.2 / 2.8, 0.35);
+  EXPECT_LT(meeting.near_s, meeting.touch_s);
+  EXPECT_GT(meeting.own_mps, 1.0);
+  // At half the speed it has gone by; what stands beside its way is not met.
+  EXPECT_EQ(sut.meets(straight(0.0, 1.0), at_s(2.0), kPlanned_m, kOwn_m).near_s, BodyTracks::kNever);
+  EXPECT_EQ(sut.meets(Trajectory::hold({5, 0, 3}, at_s(0.0)), at_s(2.0), kPlanned_m, kOwn_m).near_s,
+            BodyTracks::kNever);
+}
+
+TEST(BodyTracks, PreferKeepingOffThenPassingThenStanding) {
+  const BodyTracks sut = crossing_until(2.0);
+  const auto score = [&](const Trajectory& t) { return sut.meets(t, at_s(2.0), kPlanned_m, kOwn_m).score(); };
+  const double away = score(Trajectory::hold({4, 0, 3}, at_s(0.0)));
+  const double beside = score(Trajectory::hold({8.4, 0, 3}, at_s(0.0)));
+  const double stands = score(Trajectory::hold({10, 0, 3}, at_s(0.0)));
+  const double flies_into = score(straight(0.0, 2.0));
+  EXPECT_EQ(away, BodyTracks::kNever);
+  EXPECT_GT(away, beside);
+  EXPECT_GT(beside, stands);
+  EXPECT_GT(stands, flies_into);
+}
+
+TEST(BodyTracks, WhatPartsDoesNotMeet) {
+  const BodyTracks sut = crossing_until(5.6);  // 1.2 m past the line, going on
+  EXPECT_EQ(sut.meets(Trajectory::hold({10, 0, 3}, at_s(0.0)), at_s(5.6), kPlanned_m, kOwn_m).near_s,
+            BodyTracks::kNever);
+}
+
+TEST(BodyTracks, BoundsGrowWithTimeUnseenAndTracksEnd) {
+  const BodyTracks sut = crossing_until(2.0);
+  // At rest 2.2 m beside its way: far enough now, not after a while without a look.
+  const Trajectory beside = Trajectory::hold({7.9, 0, 3}, at_s(0.0));
+  EXPECT_GT(sut.meets(beside, at_s(2.0), kPlanned_m, kOwn_m).near_s, 0.0);
+  EXPECT_EQ(sut.count(at_s(3.9)), 1U);
+  EXPECT_EQ(sut.count(at_s(4.1)), 0U) << "two seconds without being seen";
+}
+
+TEST(BodyTracks, FollowManyAtOnceAndForgetTheOldest) {
+  BodyTracks sut;
+  for (double t = 0.0; t < 1.01; t += 0.2) {
+    std::array<Vector3, 16> places_W;
+    for (std::size_t i = 0; i < places_W.size(); ++i)
+      places_W[i] = Vector3(8.0 * static_cast<double>(i), 1.5 * t, 3.0);
+    const test::NoAllocScope scope;
+    sut.observe(at_s(t), places_W);
+    (void)sut.meets(straight(0.0, 2.0), at_s(t), kPlanned_m, kOwn_m);
+    EXPECT_EQ(scope.count(), 0U);
+  }
+  EXPECT_LE(sut.count(at_s(1.0)), BodyTracks::kMost);
+  EXPECT_GE(sut.count(at_s(1.0)), 8U);
+}
+
+}  // namespace
+}  // namespace roborun::flight

@@ -1,0 +1,61 @@
+#!/usr/bin/env bash
+# roborun run --guard against a listening socket: OBSTACLE_DISTANCE at 10 Hz, a heartbeat, and no command. usage: guard_test.sh ROBORUN ROOT
+set -uo pipefail
+roborun=$1 root=$2
+folder=$(mktemp -d)
+name=$(basename "$folder")
+plant= run= ear=
+trap 'kill -9 $plant $run $ear 2>/dev/null; rm -rf "$folder" /dev/shm/roborun-$name-*' EXIT
+port=$((20000 + RANDOM % 12000))
+link=udpin://127.0.0.1:$((port + 1))
+# In hover 10 m ahead of the start; a pillar of 2 m radius has its middle 10 m further on and 1 m to the left: 8.05 m away, 6 degrees.
+"$roborun" plant --world "$root/tests/data/worlds/two_pillars.toml" --port "$name" --autopilot px4 --seconds 90 \
+  --mavlink "udpout://127.0.0.1:$((port + 1))" --json >"$folder/plant.json" 2>"$folder/plant.err" &
+plant=$!
+"$roborun" run --vehicle paper --link "$link" --port "$name" --autopilot px4 --arm --profile paper --best-effort --wait 30 \
+  --mission "$root/tests/data/missions/hover.waypoints" --bounds=-10,-15,1.5,70,15,8 >/dev/null 2>"$folder/run.err" &
+run=$!
+for _ in $(seq 300); do
+  grep -q ", at (9\.[89], \|, at (10\.[012], " "$folder/plant.err" 2>/dev/null && break
+  sleep 0.1
+done
+sleep 4
+python3 -c 'import socket, sys
+s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+s.bind(("127.0.0.1", int(sys.argv[1])))
+s.settimeout(8)
+out = open(sys.argv[2], "wb")
+try:
+  while True: out.write(s.recv(2048))
+except TimeoutError: pass' "$port" "$folder/heard.bin" &
+ear=$!
+sleep 0.5
+"$roborun" run --guard --vehicle paper --link "udpout://127.0.0.1:$port" --port "$name" --wait 30 --seconds 5 --json >"$folder/guard.json"
+code=$?
+wait $ear
+"$roborun" mavlink decode "$folder/heard.bin" --json >"$folder/heard.json"
+python3 - "$folder" "$code" <<'PY'
+import collections, json, sys
+folder, code = sys.argv[1], int(sys.argv[2])
+said = [json.loads(l) for l in open(folder + "/heard.json") if '"name"' in l]
+guard = json.loads(open(folder + "/guard.json").read())
+names = collections.Counter(m["name"] for m in said)
+maps = [m["fields"] for m in said if m["name"] == "OBSTACLE_DISTANCE"]
+gaps = [(b["time_usec"] - a["time_usec"]) * 1e-6 for a, b in zip(maps, maps[1:])]
+last = maps[-1]["distances"]
+checks = {
+  "exit code": code == 0,
+  "nothing but map and heartbeat": set(names) == {"OBSTACLE_DISTANCE", "HEARTBEAT"},
+  "all arrived": len(maps) == guard["messages"],
+  "10 Hz": 45 <= len(maps) <= 51 and sorted(gaps)[len(gaps) // 2] < 0.11,
+  "heartbeats": 4 <= names["HEARTBEAT"] <= 6,
+  "sender": all(m["sysid"] == 1 and m["compid"] == 196 for m in said),
+  "frame": maps[-1]["frame"] == 12 and maps[-1]["increment"] == 5,
+  "pillar": abs(min(last) - 805) < 60 and last.index(min(last)) in (69, 70, 71, 0, 1),
+  "nearest": abs(guard["nearest_m"] - 8.05) < 0.6,
+}
+print(names, last, guard)
+wrong = [k for k, v in checks.items() if not v]
+print("wrong:", wrong)
+sys.exit(bool(wrong))
+PY

@@ -1,0 +1,85 @@
+#include "platform/live/obstacle_sectors.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace roborun::live {
+namespace {
+
+constexpr std::size_t kWidth = 160, kHeight = 120;
+constexpr std::uint16_t kFree = 2501;
+
+/// One camera of 90 x 73 degrees, 25 m, that looks ahead or to the right.
+class ObstacleSectorsTest : public ::testing::Test {
+ protected:
+  void show(bool to_the_right) {
+    firmware_if::DepthFrame frame;
+    frame.stamp = MonotonicTime{Nanos{1'000'000'000}};
+    frame.width = kWidth;
+    frame.height = kHeight;
+    frame.tan_half_width = 1.0F;
+    frame.tan_half_height = 0.75F;
+    frame.range_m = 25.0F;
+    frame.range_min_m = 0.3F;
+    frame.depth_m = depth_m;
+    firmware_if::CameraMount mount;
+    if (to_the_right) mount.R_BC = {0, 1, 0, -1, 0, 0, 0, 0, 1};  // its x is the body's -y
+    sut.see(0, frame, mount);
+  }
+  [[nodiscard]] std::uint16_t at(std::size_t degrees, Nanos age = Nanos{0}) const {
+    return sut.message(MonotonicTime{Nanos{1'000'000'000}} + age).distances.at(degrees / 5);
+  }
+  std::vector<float> depth_m = std::vector<float>(kWidth * kHeight, std::numeric_limits<float>::infinity());
+  ObstacleSectors sut{1, 0.5};
+};
+
+TEST_F(ObstacleSectorsTest, AWallAheadIsAheadAndOneOnTheRightIsClockwise) {
+  depth_m.assign(depth_m.size(), 4.0F);
+  show(false);
+  EXPECT_NEAR(at(0), 400, 2);
+  EXPECT_NEAR(at(30), 400.0 / std::cos(27.5 * M_PI / 180.0), 8);
+  EXPECT_EQ(at(90), ObstacleSectors::kUnknown);
+  EXPECT_EQ(at(180), ObstacleSectors::kUnknown);
+  show(true);
+  EXPECT_NEAR(at(90), 400, 2);
+  EXPECT_EQ(at(0), ObstacleSectors::kUnknown);
+  EXPECT_EQ(at(270), ObstacleSectors::kUnknown);
+}
+
+TEST_F(ObstacleSectorsTest, NothingIsFreeAndSilenceIsNotKnown) {
+  show(false);
+  EXPECT_EQ(at(0), kFree);
+  EXPECT_EQ(at(355), kFree);
+  EXPECT_EQ(at(0, Nanos{600'000'000}), ObstacleSectors::kUnknown) << "an old image";
+  depth_m[kHeight / 2 * kWidth + kWidth / 2] = std::numeric_limits<float>::quiet_NaN();
+  show(false);
+  EXPECT_EQ(at(0), ObstacleSectors::kUnknown) << "one level ray said nothing";
+  EXPECT_EQ(at(30), kFree);
+}
+
+TEST_F(ObstacleSectorsTest, OnlyTheBandCounts) {
+  for (std::size_t v = kHeight * 3 / 4; v < kHeight; ++v)
+    for (std::size_t u = 0; u < kWidth; ++u) depth_m[v * kWidth + u] = 5.0F;  // 1.9 m below and lower: ground
+  show(false);
+  EXPECT_EQ(at(0), kFree);
+  depth_m[kHeight / 2 * kWidth + kWidth / 2] = 7.0F;  // one pixel of a pole
+  show(false);
+  EXPECT_NEAR(at(0), 700, 2);
+  EXPECT_EQ(at(10), kFree);
+  EXPECT_NEAR(sut.nearest_m(MonotonicTime{Nanos{1'000'000'000}}), 7.0, 0.02);
+}
+
+TEST_F(ObstacleSectorsTest, IsSentInTheBodysFrame) {
+  show(false);
+  const auto m = sut.message(MonotonicTime{Nanos{1'000'000'000}});
+  EXPECT_EQ(m.frame, 12);
+  EXPECT_EQ(m.increment, 5);
+  EXPECT_EQ(m.min_distance, 31);  // 0.3F is a little more
+  EXPECT_EQ(m.max_distance, 2500);
+}
+
+}  // namespace
+}  // namespace roborun::live

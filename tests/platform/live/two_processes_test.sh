@@ -1,0 +1,106 @@
+#!/usr/bin/env bash
+# Flights of a plant and a runtime as two processes, or three with a feeder, and what becomes of each when the other one dies.
+# usage: two_processes_test.sh ROBORUN ROOT
+set -uo pipefail
+roborun=$1 root=$2
+folder=$(mktemp -d)
+. "$(dirname "$0")/flight_checks.sh"
+name=$(basename "$folder")
+plant= run= feeder=
+trap 'kill -9 $plant $run $feeder 2>/dev/null; rm -rf "$folder" /dev/shm/roborun-$name-*' EXIT
+
+start() {  # OPTION_OF_PLANT..: both, in a world of 60 m
+  rm -f "$folder"/*.json
+  "$roborun" plant --world "$root/tests/data/worlds/two_pillars.toml" --port "$name" --seconds 240 --json "$@" \
+    >"$folder/plant.json" 2>"$folder/plant.err" &
+  plant=$!
+  "$roborun" run --vehicle paper --link "port:$name" --goal 60,0,4 --bounds -10,-15,1.5,70,15,8 --profile paper \
+    --best-effort --wait 60 --seconds 120 --json >"$folder/run.json" 2>"$folder/run.err" &
+  run=$!
+}
+# Until the vehicle has flown for so many seconds: the runtime's commands are on the bus, and it moves.
+flown() {  # SECONDS
+  local i
+  for i in $(seq 600); do
+    [[ -e /dev/shm/roborun-$name-bus-out ]] && break
+    sleep 0.1
+  done
+  sleep "$1"
+}
+
+reaches_the_goal() {
+  start
+  ends 0 $run && ends 0 $plant && is True run reached_goal && is landed run ended && is True plant reached_goal &&
+    is False plant collided && is landed plant reason && is 0 run heap_calls_after_start
+}
+lands_on_a_signal() {
+  start
+  flown 9
+  kill -TERM $run
+  ends 130 $run && ends 0 $plant && is interrupted run reason && is landed run ended && is False plant collided &&
+    is landed plant reason
+}
+# No IMU: nothing can be controlled. Motors off, and the report says so.
+switches_off_without_a_plant() {
+  start
+  flown 9
+  kill -KILL $plant
+  ends 1 $run && is terminated run reason && is "motors off" run ended && is False run reached_goal
+}
+# The same for one that stands still: what it says afterwards changes nothing.
+switches_off_when_the_plant_stops() {
+  start
+  flown 9
+  kill -STOP $plant
+  sleep 2
+  kill -CONT $plant
+  ends 1 $run && is terminated run reason && ends 1 $plant && is collision plant reason
+}
+# The motors' controllers stop by themselves when nobody commands, and what was in the air falls.
+falls_without_a_runtime() {
+  start
+  flown 9
+  kill -KILL $run
+  ends 1 $plant && is collision plant reason && is True plant collided
+}
+plant_ends_on_a_signal() {
+  start
+  flown 4
+  kill -INT $plant
+  ends 130 $plant && is interrupted plant reason && ends 1 $run
+}
+
+feed() {
+  local i
+  for i in $(seq 100); do
+    "$roborun" port list | grep -q "^$name-truth .* written to" && break
+    sleep 0.1
+  done
+  "$roborun" feed plant --world "$root/tests/data/worlds/two_pillars.toml" --port "$name" >"$folder/feed.err" 2>&1 &
+  feeder=$!
+}
+# The cameras' process is killed and starts again.
+goes_on_with_a_new_feeder() {
+  start --no-pictures
+  feed
+  flown 9
+  kill -KILL $feeder
+  sleep 0.2
+  feed
+  ends 0 $run && ends 0 $plant && is True run reached_goal && is False plant collided && ends 0 $feeder
+}
+# Without images it holds, and then comes down.
+lands_without_a_feeder() {
+  start --no-pictures
+  feed
+  flown 9
+  kill -KILL $feeder
+  ends 1 $run && ends 0 $plant && is holding run reason && is landed run ended && is False plant collided && is landed plant reason
+}
+
+failed=0
+for flight in reaches_the_goal lands_on_a_signal switches_off_without_a_plant switches_off_when_the_plant_stops \
+  falls_without_a_runtime plant_ends_on_a_signal goes_on_with_a_new_feeder lands_without_a_feeder; do
+  tries $flight $flight || failed=$((failed + 1))
+done
+[[ $failed -eq 0 ]]
