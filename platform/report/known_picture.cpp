@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "platform/report/scene_drawing.hpp"
 
@@ -14,6 +15,8 @@ constexpr double kPictureWidth = 830.0;
 constexpr double kPictureLeft = 50.0;
 constexpr double kPictureRight = 20.0;
 constexpr double kPictureMaxPanel = 700.0;
+constexpr double kStep_s = 0.5;
+constexpr double kTimesReal = 10.0;
 constexpr const char* kUnseen = "#d3d6da";
 constexpr const char* kFree = "#e8f3ff";
 constexpr const char* kSeen = "#d55e00";  // Okabe and Ito
@@ -38,6 +41,27 @@ void draw_known(Svg& svg, const KnownSlice& known, const Aabb& bounds_W, const F
            cell[begin] == KnownSlice::Cell::kFree ? kFree : kSeen);
     }
   }
+}
+
+/// The vehicle on its way, `kTimesReal` as fast, over and over. Points of equal times: what lies between them is interpolated.
+void draw_vehicle(Svg& svg, const MissionReport& mission, const Frame& f) {
+  std::string x, y;
+  double next_s = 0.0;
+  int steps = -1;
+  for (const PathPoint& p : mission.path) {
+    if (p.time_s < next_s) continue;
+    x += fmt::format("{}{:.0f}", x.empty() ? "" : ";", f.x(p.p_WB.x()));
+    y += fmt::format("{}{:.0f}", y.empty() ? "" : ";", f.y(p.p_WB.y()));
+    next_s += kStep_s;
+    ++steps;
+  }
+  if (steps < 1) return;
+  svg.add(R"(<circle class="vehicle" r="7" fill="#e12d39" stroke="#ffffff" stroke-width="2">)");
+  for (const auto& [axis, values] : {std::pair{"cx", &x}, std::pair{"cy", &y}}) {
+    svg.add(R"(<animate attributeName="{}" values="{}" dur="{:.1f}s" repeatCount="indefinite"/>)", axis,
+            *values, steps * kStep_s / kTimesReal);
+  }
+  svg.add("</circle>");
 }
 
 struct Key {
@@ -72,6 +96,7 @@ std::string known_svg(const Scene& scene, std::span<const MissionReport> mission
     svg.text(x + 19, 91, key.text, "start", 13);
     x += key.width + 19;
   }
+  svg.add("<style>@media (prefers-reduced-motion) {{ .vehicle {{ display: none }} }}</style>");
   double y = 120;
   for (const MissionReport& mission : missions) {
     const MissionResult& r = mission.result;
@@ -84,12 +109,14 @@ std::string known_svg(const Scene& scene, std::span<const MissionReport> mission
     draw_world(svg, plain, f, panel, [&] { draw_known(svg, mission.known, scene.bounds_W, f); });
     draw_path(svg, mission, f, coloured);
     draw_ends(svg, scene, f);
+    draw_vehicle(svg, mission, f);
     y += panel + 56;
   }
-  return svg.finish(kPictureWidth, y - 20, scene.title,
-                    "Worlds from above: the way flown, coloured by speed, over what the vehicle's map knew "
-                    "to be free, knew to be "
-                    "occupied, and did not know when the flight ended.");
+  return svg.finish(
+      kPictureWidth, y - 20, scene.title,
+      "Worlds from above: the way flown, coloured by speed, over what the vehicle's map knew to be "
+      "free, knew to be occupied, and did not know when the flight ended. A red dot flies the way at "
+      "ten times its speed.");
 }
 
 }  // namespace roborun::report

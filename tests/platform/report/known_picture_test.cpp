@@ -36,6 +36,21 @@ TEST(KnownSvg, DrawsRunsOfKnownCellsOnceAndLeavesTheRestUnknown) {
   EXPECT_NE(svg.find("<desc>"), std::string::npos);
 }
 
+TEST(KnownSvg, FliesADotAlongThePathTrueToTime) {
+  MissionReport mission = flown();
+  mission.path.clear();
+  for (int i = 0; i <= 100;
+       ++i)  // 10 s at 10 Hz, 1 m/s along x: 21 points, half a second apart, 10 times as fast
+    mission.path.push_back({0.1 * i, Vector3(0.1 * i, 0.0, 3.0), 1.0});
+  const std::string svg = known_svg(scene(), std::vector<MissionReport>{mission});
+  EXPECT_TRUE(test::well_formed(svg));
+  ASSERT_EQ(test::count(svg, "<animate "), 2U);
+  const std::size_t begin = svg.find("attributeName=\"cx\" values=\"");
+  const std::string values = svg.substr(begin, svg.find("\" dur=\"", begin) - begin);
+  EXPECT_EQ(test::count(values, ";"), 20U);
+  EXPECT_EQ(test::count(svg, "dur=\"1.0s\""), 2U);
+}
+
 TEST(KnownSvg, DrawsNothingOutsideOfTheBounds) {
   std::vector<MissionReport> missions{flown()};
   missions.front().known.x_m = 100.0;
