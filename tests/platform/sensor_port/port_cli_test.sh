@@ -27,7 +27,7 @@ says 0 "READY     $name: " port check "$name"
 says 0 "160 x 120, 90 x 74 degrees, 100 % of the pixels know something" port check "$path"
 says 0 '"ready":true' port check "$name" --json
 says 0 "written to" port list
-says 0 "nearest 5.00 m; 0 missed" port watch "$name" --seconds 0.5
+says 0 "nearest 5.00 m; " port watch "$name" --seconds 0.5
 kill -9 $feeder
 wait $feeder 2>/dev/null
 says 1 "NOT READY $name: no process writes to it: start its feeder" port check "$name" --seconds 0.2
