@@ -322,9 +322,6 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   WayPlaces places;
   find_places(cells, width_, 0, places);
   forbid(block, places);
-  WayPlaces narrow;
-  if (narrow_width_ < width_) find_places(cells, narrow_width_, 0, narrow);
-  forbid(block, narrow);
   const auto all = [](const CellRows& rows, std::uint16_t value) {
     return std::all_of(rows.begin(), rows.end(), [value](std::uint16_t row) { return row == value; });
   };
@@ -343,6 +340,9 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   }
   Block* b = take(position);
   if (b == nullptr) return;
+  WayPlaces narrow;
+  if (narrow_width_ < width_) find_places(cells, narrow_width_, 0, narrow);
+  forbid(block, narrow);
   for (std::size_t i = 0; i < narrow.known.size(); ++i)
     places.doubtful[i] = static_cast<std::uint16_t>(narrow.known[i] & ~places.known[i] & ~places.open[i]);
   number_rooms(places, b->rooms);
