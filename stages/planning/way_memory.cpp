@@ -55,6 +55,12 @@ Extent extent_of(const WayMemory::Config& config) noexcept {
   return e;
 }
 
+/// One cell less on either side than plans take, for that much surfaces are off, and no less than the vehicle.
+int narrow_width(const WayMemory::Config& config, int width) noexcept {
+  const int body = static_cast<int>(std::ceil(2.0 * config.body_m / config.finest_m - 1e-6));
+  return std::clamp(body, std::max(width - 2, 1), width);
+}
+
 /// Of the square inside the vehicle's circle, seen from above, so many cells as surely fit into it: however a gap lies.
 int core_width(const WayMemory::Config& config) noexcept {
   constexpr double kInscribed = 0.7071;
@@ -79,6 +85,7 @@ std::size_t WayMemory::arena_bytes(const Config& config) noexcept {
 WayMemory::WayMemory(const Config& config, core::Arena& arena) noexcept
     : config_((ROBORUN_ASSERT(fits(config)), config)),
       width_(static_cast<int>(std::ceil(2.0 * config.radius_m / config.finest_m - 1e-6))),
+      narrow_width_(narrow_width(config, width_)),
       core_width_(core_width(config)),
       position_(arena.take<Position>(static_cast<std::size_t>(extent_of(config).blocks), "way positions")),
       position_pool_(arena.last_pool()),
@@ -102,6 +109,7 @@ void WayMemory::forget() noexcept {
   block_count_ = 0;
   seen_count_ = 0;
   ++search_;  // what was found by the last one is not there any more
+  doubts_ = false;
   looked_from_W_ = Vector3::Constant(1e9);
   seen_low_ = {0, 0, 0};
   seen_high_ = {-1, -1, -1};
@@ -142,7 +150,7 @@ bool WayMemory::nearest_room(const Vector3& p_W, Cell& place) const noexcept {
       for (std::int32_t dx = -2; dx <= 2; ++dx) {
         const Cell c{at.x + dx, at.y + dy, at.z + dz};
         const unsigned room = room_at(c);
-        if (room == 0) continue;
+        if (room == 0 || is_doubtful_room(room)) continue;
         const int cost = dx * dx + dy * dy + dz * dz + (is_known_room(room) ? 0 : 100);
         if (cost >= best) continue;
         best = cost;
@@ -332,6 +340,11 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   }
   Block* b = take(position);
   if (b == nullptr) return;
+  WayPlaces narrow;
+  if (narrow_width_ < width_) find_places(cells, narrow_width_, 0, narrow);
+  forbid(block, narrow);
+  for (std::size_t i = 0; i < narrow.known.size(); ++i)
+    places.doubtful[i] = static_cast<std::uint16_t>(narrow.known[i] & ~places.known[i] & ~places.open[i]);
   number_rooms(places, b->rooms);
   b->passable = passable;
 }

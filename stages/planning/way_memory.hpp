@@ -21,7 +21,8 @@ namespace roborun::stages {
 /// Space is divided into blocks of 16 cells an edge, and the places of a vehicle inside each into rooms: connected places that are
 /// known to be free, or that may be. Doors join rooms of neighbouring blocks, and known with open ones. What was seen
 /// stays, whatever the map gives up. The search runs from the goal over rooms, known space at its length and open space
-/// at kUnknownWeight times its length, until it comes to the vehicle. Exact in what is connected (for whole cells), coarse in
+/// at kUnknownWeight times its length, until it comes to the vehicle. Where that finds nothing and nothing is proved, it runs
+/// once more through doubtful places, too, which are dear: the vehicle goes there and looks closely. Exact in what is connected (for whole cells), coarse in
 /// lengths. Source: Dijkstra (1959), over the regions of Botea, Mueller, Schaeffer, "Near optimal hierarchical
 /// path-finding" (2004).
 class WayMemory final : public Ways {
@@ -66,7 +67,7 @@ class WayMemory final : public Ways {
   /// From a block to the one beyond a face.
   static constexpr std::array<Cell, kFaces> kStep{
       {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
-  static constexpr std::size_t kDoorsPerFace = 6;
+  static constexpr std::size_t kDoorsPerFace = 8;
   struct Block {
     WayRooms rooms{};
     std::array<std::array<Door, kDoorsPerFace>, kFaces + 1> door{};
@@ -141,6 +142,15 @@ class WayMemory final : public Ways {
     return position_[position].kind;
   }
 
+  /// From the goal to the room of `start`: kOk; kGoalBlocked; kBudgetSpent; kNoPath.
+  [[nodiscard]] Status search(const Cell& start, const Vector3& goal_W, core::StageBudget& budget,
+                              core::Work& work) noexcept;
+  /// The way that was found from here leads through a doubtful room.
+  [[nodiscard]] bool is_way_doubtful(std::uint32_t node) const noexcept;
+  [[nodiscard]] bool is_doubtful(std::uint32_t node) const noexcept {
+    return node >= position_.size() &&
+           is_doubtful_room(static_cast<unsigned>((node - position_.size()) % kRooms));
+  }
   [[nodiscard]] bool seed(const Vector3& goal_W) noexcept;
   /// From where the search ends, straight on.
   [[nodiscard]] bool seed_border(const Vector3& goal_W) noexcept;
@@ -184,10 +194,11 @@ class WayMemory final : public Ways {
   [[nodiscard]] Cell core_at(const Vector3& p_W) const noexcept;
 
   Config config_;
-  int width_;       ///< Of the vehicle, in cells.
-  int core_width_;  ///< Of what surely fits inside the body, however a gap lies.
-  Cell corner_{};   ///< First cell of the first block, in cells from the world's origin.
-  Cell size_{};     ///< Blocks.
+  int width_;         ///< Of the vehicle, in cells.
+  int narrow_width_;  ///< Of what may turn out to have room for it: see WayPlaces::doubtful.
+  int core_width_;    ///< Of what surely fits inside the body, however a gap lies.
+  Cell corner_{};     ///< First cell of the first block, in cells from the world's origin.
+  Cell size_{};       ///< Blocks.
   std::span<Position> position_;
   core::PoolRecord& position_pool_;
   std::size_t seen_count_{};
@@ -204,6 +215,7 @@ class WayMemory final : public Ways {
   std::uint32_t search_{0};
   core::LeastFirst reached_;
   bool overflown_{};
+  bool doubts_{};  ///< The search takes doubtful rooms, too: without them there was no way.
   Vector3 looked_from_W_ = Vector3::Constant(1e9);
   Cell seen_low_{0, 0, 0}, seen_high_{-1, -1, -1};  ///< Of all blocks looked at.
   Cell low_{}, high_{};                             ///< What the search runs in.

@@ -5,21 +5,25 @@
 namespace roborun::stages {
 namespace {
 
-/// Of a row of places those in known rooms that have one in an open room beside them: the highest of each place's four bits, which says
-/// of a room whether it is open. So a row is one operation.
-std::uint64_t known_beside_open(const WayRooms& rooms, std::int32_t y, std::int32_t z) noexcept {
-  static_assert(kFirstOpenRoom == 8 && kRooms == 16);
+/// Of a row of places those in known rooms that have one in an open or doubtful room beside them, and those in doubtful rooms
+/// that have one in an open room beside them: the highest of each place's four bits, which says of a room whether it is known.
+/// So a row is one operation.
+std::uint64_t beside_other_kind(const WayRooms& rooms, std::int32_t y, std::int32_t z) noexcept {
+  static_assert(kFirstOpenRoom == 8 && kFirstDoubtfulRoom == 13 && kRooms == 16);
   constexpr std::uint64_t kHigh = 0x8888'8888'8888'8888ULL;
   const auto row = [&rooms](std::int32_t at_y, std::int32_t at_z) {
     return ((at_y | at_z) & ~15) != 0
                ? 0
                : rooms.number[16 * static_cast<std::size_t>(at_z) + static_cast<std::size_t>(at_y)];
   };
+  const auto doubtful = [](std::uint64_t n) { return n & n << 1U & (n << 2U | n << 3U) & kHigh; };
+  const auto open = [&](std::uint64_t n) { return n & kHigh & ~doubtful(n); };
   const std::uint64_t n = row(y, z);
   const std::uint64_t known = (n << 1U | n << 2U | n << 3U) & ~n;
-  const std::uint64_t beside =
-      n << 4U | n >> 4U | row(y - 1, z) | row(y + 1, z) | row(y, z - 1) | row(y, z + 1);
-  return known & beside & kHigh;
+  const std::uint64_t any = n << 4U | n >> 4U | row(y - 1, z) | row(y + 1, z) | row(y, z - 1) | row(y, z + 1);
+  const std::uint64_t beside_open = open(n) << 4U | open(n) >> 4U | open(row(y - 1, z)) |
+                                    open(row(y + 1, z)) | open(row(y, z - 1)) | open(row(y, z + 1));
+  return (known & any & kHigh) | (doubtful(n) & beside_open);
 }
 
 /// The rooms of the places at a face: of place u in row v, in bits 4 u and up.
@@ -37,6 +41,11 @@ void face_of(const WayRooms& rooms, std::size_t face, FaceRooms& face_rooms) noe
       row |= (rooms.number[16 * v + u] >> (4 * side) & 15U) << (4 * u);
     face_rooms[v] = row;
   }
+}
+
+/// Those come last where there are more doors than fit.
+bool is_doubtful_door(unsigned room, unsigned other) noexcept {
+  return is_doubtful_room(room) || is_doubtful_room(other);
 }
 
 /// The places of two rooms that touch across a face.
@@ -117,16 +126,19 @@ void WayMemory::find_face_doors(Block& b, const Cell& block, std::size_t face) n
     nearer(rooms, 2 * (p.u - below * p.count) > p.count ? below + 1 : below, v);
   });
   const int side = face % 2 == 0 ? 15 : 0;
-  for (unsigned i = 0; i < 4; ++i) {
-    for (std::uint64_t bits = met[i]; bits != 0 && b.doors[face] < kDoorsPerFace; bits &= bits - 1) {
-      const unsigned rooms = 64 * i + static_cast<unsigned>(std::countr_zero(bits));
-      const FacePair& p = pair[rooms];
-      const Cell c = face / 2 == 0   ? Cell{side, p.at_u, p.at_v}
-                     : face / 2 == 1 ? Cell{p.at_u, side, p.at_v}
-                                     : Cell{p.at_u, p.at_v, side};
-      b.door[face][b.doors[face]++] = {
-          static_cast<std::uint8_t>(rooms / kRooms), static_cast<std::uint8_t>(rooms % kRooms),
-          static_cast<std::uint8_t>(c.x), static_cast<std::uint8_t>(c.y), static_cast<std::uint8_t>(c.z)};
+  for (const bool doubtful : {false, true}) {
+    for (unsigned i = 0; i < 4; ++i) {
+      for (std::uint64_t bits = met[i]; bits != 0 && b.doors[face] < kDoorsPerFace; bits &= bits - 1) {
+        const unsigned rooms = 64 * i + static_cast<unsigned>(std::countr_zero(bits));
+        if (is_doubtful_door(rooms / kRooms, rooms % kRooms) != doubtful) continue;
+        const FacePair& p = pair[rooms];
+        const Cell c = face / 2 == 0   ? Cell{side, p.at_u, p.at_v}
+                       : face / 2 == 1 ? Cell{p.at_u, side, p.at_v}
+                                       : Cell{p.at_u, p.at_v, side};
+        b.door[face][b.doors[face]++] = {
+            static_cast<std::uint8_t>(rooms / kRooms), static_cast<std::uint8_t>(rooms % kRooms),
+            static_cast<std::uint8_t>(c.x), static_cast<std::uint8_t>(c.y), static_cast<std::uint8_t>(c.z)};
+      }
     }
   }
 }
@@ -136,17 +148,19 @@ void WayMemory::find_inner_doors(Block& b) noexcept {
   struct Pair {
     int count, x, y, z;
   };
-  std::array<Pair, std::size_t{kFirstOpenRoom} * kFirstOpenRoom> pair{};
+  constexpr unsigned kOthers = kRooms - kFirstOpenRoom;
+  std::array<Pair, std::size_t{kRooms} * kOthers> pair{};
   const auto for_each = [&b](const auto& what) {
     for (std::int32_t i = 0; i < 256; ++i) {
       const std::int32_t y = i % 16, z = i / 16;
-      for (std::uint64_t bits = known_beside_open(b.rooms, y, z); bits != 0; bits &= bits - 1) {
+      for (std::uint64_t bits = beside_other_kind(b.rooms, y, z); bits != 0; bits &= bits - 1) {
         const std::int32_t x = std::countr_zero(bits) / 4;
         const unsigned room = b.rooms.at(x, y, z);
         const auto beside = [&](std::int32_t nx, std::int32_t ny, std::int32_t nz) {
           if (((nx | ny | nz) & ~15) != 0) return;
           const unsigned other = b.rooms.at(nx, ny, nz);
-          if (other >= kFirstOpenRoom) what(room * kFirstOpenRoom + other - kFirstOpenRoom, x, y, z);
+          if (other >= kFirstOpenRoom && !(is_doubtful_room(room) && is_doubtful_room(other)))
+            what(room * kOthers + other - kFirstOpenRoom, x, y, z);
         };
         beside(x + 1, y, z), beside(x - 1, y, z), beside(x, y + 1, z), beside(x, y - 1, z),
             beside(x, y, z + 1), beside(x, y, z - 1);
@@ -169,12 +183,15 @@ void WayMemory::find_inner_doors(Block& b) noexcept {
     const int away = dx * dx + dy * dy + dz * dz;
     if (away >= best[rooms]) return;
     best[rooms] = away;
-    door[rooms] = {static_cast<std::uint8_t>(rooms / kFirstOpenRoom),
-                   static_cast<std::uint8_t>(rooms % kFirstOpenRoom + kFirstOpenRoom),
-                   static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(z)};
+    door[rooms] = {static_cast<std::uint8_t>(rooms / kOthers),
+                   static_cast<std::uint8_t>(rooms % kOthers + kFirstOpenRoom), static_cast<std::uint8_t>(x),
+                   static_cast<std::uint8_t>(y), static_cast<std::uint8_t>(z)};
   });
-  for (std::size_t i = 0; i < pair.size() && b.doors[kInside] < kDoorsPerFace; ++i) {
-    if (pair[i].count > 0) b.door[kInside][b.doors[kInside]++] = door[i];
+  for (const bool doubtful : {false, true}) {
+    for (std::size_t i = 0; i < pair.size() && b.doors[kInside] < kDoorsPerFace; ++i) {
+      if (pair[i].count > 0 && is_doubtful_door(door[i].room, door[i].other) == doubtful)
+        b.door[kInside][b.doors[kInside]++] = door[i];
+    }
   }
 }
 

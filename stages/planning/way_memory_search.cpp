@@ -10,13 +10,16 @@ namespace {
 
 constexpr double kCost_m = 0.01;  // of costs
 constexpr std::uint32_t kNodesPerPoll = 256;
+constexpr double kDoubtful = 4.0;        // times as dear as what is unknown
 constexpr double kWaits = 16.0;          // after so many what is unknown costs twice as much
 constexpr std::uint32_t kBeyond = 3000;  // units of cost that the search runs on beyond the vehicle
 
 }  // namespace
 
 double WayMemory::price(std::uint32_t position, unsigned room) const noexcept {
-  return is_known_room(room) ? 1.0 : kUnknownWeight * (1.0 + position_[position].waits / kWaits);
+  if (is_known_room(room)) return 1.0;
+  const double unknown = kUnknownWeight * (1.0 + position_[position].waits / kWaits);
+  return is_doubtful_room(room) ? kDoubtful * unknown : unknown;
 }
 
 std::uint32_t WayMemory::step_cost(const Cell& from, const Cell& to, double price) const noexcept {
@@ -26,6 +29,7 @@ std::uint32_t WayMemory::step_cost(const Cell& from, const Cell& to, double pric
 
 void WayMemory::reach(std::uint32_t node, std::uint32_t cost, std::uint32_t next,
                       const Cell& entry) noexcept {
+  if (!doubts_ && is_doubtful(node)) return;
   Node& n = node_[node];
   if (is_settled(node) || (n.reached == search_ && cost >= n.cost)) return;
   if (!reached_.push((std::uint64_t{cost} << 32U) | node)) {
@@ -131,19 +135,10 @@ bool WayMemory::seed_border(const Vector3& goal_W) noexcept {
   return any;
 }
 
-Status WayMemory::solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
-                        core::Work& work) noexcept {
-  if (seen_low_.x > seen_high_.x) return Status::kNotReady;
-  low_ = {std::max(seen_low_.x - 1, 0), std::max(seen_low_.y - 1, 0), std::max(seen_low_.z - 1, 0)};
-  high_ = {std::min(seen_high_.x + 1, size_.x - 1), std::min(seen_high_.y + 1, size_.y - 1),
-           std::min(seen_high_.z + 1, size_.z - 1)};
-  ++search_;
-  reached_.clear();
+Status WayMemory::search(const Cell& start, const Vector3& goal_W, core::StageBudget& budget,
+                         core::Work& work) noexcept {
+  begin_again();
   reached_count_ = 0;
-  overflown_ = false;
-  Cell start{};
-  if (!nearest_room(from_W, start)) return Status::kStartBlocked;
-  if (!is_finite(goal_W) || !(goal_W.cwiseAbs().maxCoeff() < kMost_m)) return Status::kInvalidArgument;
   const std::uint32_t first =
       node_of(position_of({start.x >> 4, start.y >> 4, start.z >> 4}), room_at(start));
   if (!seed(goal_W)) return Status::kGoalBlocked;
@@ -159,10 +154,38 @@ Status WayMemory::solve(const Vector3& from_W, const Vector3& goal_W, core::Stag
     if (node == first) until = node_[node].cost + kBeyond;
     relax(node);
   }
-  if (is_settled(first)) return Status::kOk;
-  if (overflown_) return Status::kBudgetSpent;
+  if (is_settled(first)) {
+    doubts_ = doubts_ && is_way_doubtful(first);
+    return Status::kOk;
+  }
+  return overflown_ ? Status::kBudgetSpent : Status::kNoPath;
+}
+
+bool WayMemory::is_way_doubtful(std::uint32_t node) const noexcept {
+  while (node != kNowhere && !is_doubtful(node)) node = node_[node].next;
+  return node != kNowhere;
+}
+
+Status WayMemory::solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
+                        core::Work& work) noexcept {
+  if (seen_low_.x > seen_high_.x) return Status::kNotReady;
+  low_ = {std::max(seen_low_.x - 1, 0), std::max(seen_low_.y - 1, 0), std::max(seen_low_.z - 1, 0)};
+  high_ = {std::min(seen_high_.x + 1, size_.x - 1), std::min(seen_high_.y + 1, size_.y - 1),
+           std::min(seen_high_.z + 1, size_.z - 1)};
+  begin_again();
+  Cell start{};
+  if (!nearest_room(from_W, start)) return Status::kStartBlocked;
+  if (!is_finite(goal_W) || !(goal_W.cwiseAbs().maxCoeff() < kMost_m)) return Status::kInvalidArgument;
+  Status status = search(start, goal_W, budget, work);
+  if (status != Status::kNoPath) return status;
   // Of a room beside the vehicle no way may lead on while one leads on from the vehicle: no proof.
-  return room_at(place_of(from_W)) != 0 ? may_lead(from_W, goal_W, budget, work) : Status::kStartBlocked;
+  const unsigned here = room_at(place_of(from_W));
+  if (here == 0 || is_doubtful_room(here)) return Status::kStartBlocked;
+  status = may_lead(from_W, goal_W, budget, work);
+  if (status != Status::kInfeasible || doubts_) return status;
+  doubts_ = true;
+  status = search(start, goal_W, budget, work);
+  return status == Status::kNoPath ? Status::kInfeasible : status;
 }
 
 double WayMemory::to_goal_m(const Vector3& p_W) const noexcept {

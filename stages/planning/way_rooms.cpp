@@ -155,7 +155,8 @@ void flood(const CellRows& rows, CellRows& room) noexcept {
 void number_rooms(const WayPlaces& places, WayRooms& rooms) noexcept {
   rooms = {};
   number(places.known, 1, kFirstOpenRoom - 1, rooms);
-  number(places.open, kFirstOpenRoom, kRooms - 1, rooms);
+  number(places.open, kFirstOpenRoom, kFirstDoubtfulRoom - 1, rooms);
+  number(places.doubtful, kFirstDoubtfulRoom, kRooms - 1, rooms);
 }
 
 }  // namespace roborun::stages

@@ -9,13 +9,16 @@
 namespace roborun::stages {
 
 /// A place (x, y, z) of a block is that of a vehicle `width` cells wide whose box begins with this cell. Known: all its
-/// cells are free. Open: none is occupied, some unknown. Anything else is closed.
-/// Rooms 1 .. 7 are known, 8 .. 15 open; 0 is closed. What is more than fits the numbers joins the last one.
+/// cells are free. Open: none is occupied, some unknown. Doubtful: neither, but a narrower box at its corner is free.
+/// Anything else is closed. Rooms 1 .. 7 are known, 8 .. 12 open, 13 .. 15 doubtful; 0 is closed. What is more than fits
+/// the numbers joins the last one.
 inline constexpr unsigned kFirstOpenRoom = 8;
+inline constexpr unsigned kFirstDoubtfulRoom = 13;
 inline constexpr unsigned kRooms = 16;
 [[nodiscard]] constexpr bool is_known_room(unsigned room) noexcept {
   return room > 0 && room < kFirstOpenRoom;
 }
+[[nodiscard]] constexpr bool is_doubtful_room(unsigned room) noexcept { return room >= kFirstDoubtfulRoom; }
 
 struct WayRooms {
   std::array<std::uint64_t, 256> number{};  ///< Of place x in row 16 z + y, in bits 4 x and up.
@@ -31,11 +34,11 @@ struct WayCells {
   std::array<BlockContent, 8> content{};
 };
 
-/// The rows of places of a block that are known and those that are open. width 1 .. 17.
+/// The rows of places of a block that are of one kind. width 1 .. 17.
 struct WayPlaces {
-  CellRows known{}, open{};
+  CellRows known{}, open{}, doubtful{};
 };
-/// Open are the known ones, too, that are at most `beyond` places before an open one: a vehicle that is so much wider ends there, before a
+/// The known and the open ones. Open are the known ones, too, that are at most `beyond` places before an open one: a vehicle that is so much wider ends there, before a
 /// hole that a narrow one looks into. width + beyond at most 17. RT-safe: O(beyond * 32^2) rounds.
 void find_places(const WayCells& cells, int width, int beyond, WayPlaces& places) noexcept;
 /// All places that are connected with those of `room`, of those in `rows`. RT-safe: O(256 * 16) rounds.

@@ -25,7 +25,7 @@ class Ways {
                                     core::StageBudget& budget, core::Work& work) noexcept = 0;
   /// The ways to the goal from everywhere that is not farther from it than the vehicle. kOk; kNoPath: there is none, and
   /// it is proved: cells that are occupied stand between both; kInfeasible: none with the room that is planned with, but
-  /// there may be one that is narrower than that, or than cells tell; kStartBlocked, kGoalBlocked: no place of the vehicle
+  /// there may be one that is narrower than that, or than cells tell, and none of it is worth a closer look; kStartBlocked, kGoalBlocked: no place of the vehicle
   /// is near (or from those near the start no way leads on, which proves nothing); kBudgetSpent: no answer.
   [[nodiscard]] virtual Status solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
                                      core::Work& work) noexcept = 0;

@@ -122,11 +122,11 @@ TEST_F(WayMemoryTest, AShellAroundTheGoalIsAProofThoughTheWorldGoesOn) {
 }
 
 TEST_F(WayMemoryTest, AGapThatMayBeWideEnoughProvesNothing) {
-  // Three cells of it are free: as wide as a vehicle of 0.45 m, which plans with 0.55, and so with four cells.
+  // Two cells of it are free: what surely fits inside a vehicle of 0.45 m, however a gap lies.
   config_.radius_m = 0.55;
   config_.body_m = 0.45;
   box(20, -21, 20.6, -0.4);
-  box(20, 0.5, 20.6, 21);
+  box(20, 0.2, 20.6, 21);
   box(-15, 20, 20.6, 20.6);
   box(-15, -20.6, 20.6, -20);
   box(-15.6, -21, -15, 21);
@@ -141,14 +141,38 @@ TEST_F(WayMemoryTest, AGapThatMayBeWideEnoughProvesNothing) {
   EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath);
 }
 
+TEST_F(WayMemoryTest, AGapThatIsOneCellTooNarrowIsAWayWhereThereIsNoOther) {
+  // Three cells of it are free: as wide as a vehicle of 0.45 m, which plans with 0.55, and so with four cells.
+  config_.radius_m = 0.55;
+  config_.body_m = 0.45;
+  box(20, -21, 20.6, -0.4);
+  box(20, 0.5, 20.6, 21);
+  box(-15, 20, 20.6, 20.6);
+  box(-15, -20.6, 20.6, -20);
+  make();
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  EXPECT_GT(std::fabs(last_known(start_W_).y()), 10.0) << "it is open behind: around the outside";
+  box(-15.6, -21, -15, 21);
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  const Vector3 end_W = last_known(start_W_);
+  EXPECT_GT(end_W.x(), 17.0) << "goes there to look closely";
+  EXPECT_LT(end_W.x(), 20.0) << "and no farther";
+  EXPECT_LT(std::fabs(end_W.y()), 3.0);
+  view_.occupied[1].min_W.y() = 1.5;
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  EXPECT_GT(last_known(start_W_).x(), 23.0) << "it turned out to be wide enough";
+  box(20, -1, 20.6, 2);
+  EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath) << "closed";
+}
+
 TEST_F(WayMemoryTest, AHoleInAWallThatNobodySawIsAWayUntilItIsSeenToBeTooNarrow) {
-  // 1.2 m of a wall: as wide as the vehicle, which plans with 1.8 m.
+  // Two cells of a wall: what surely fits inside the vehicle, which plans with six.
   config_.body_m = 0.6;
   box(-15, 20, 20.6, 20.6);
   box(-15, -20.6, 20.6, -20);
   box(-15.6, -21, -15, 21);
-  box(20, -21, 20.6, -0.6);
-  box(20, 0.6, 20.6, 21);
+  box(20, -21, 20.6, -0.4);
+  box(20, 0.4, 20.6, 21);
   view_.free_W.max_W.x() = 20.0;
   make();
   ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
