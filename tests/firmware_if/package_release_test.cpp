@@ -117,6 +117,33 @@ TEST(PackageRelease, RepeatsWhatTheBusRefusedAndSaysThatTheLineIsGone) {
   EXPECT_EQ(rig.sut.step(rig.now, rig.in), Status::kIo);
 }
 
+TEST(PackageRelease, TheLimitsThemselvesAreSafeAndADropIsCountedOnce) {
+  Rig rig;
+  rig.in.height_m = 2.0;
+  rig.in.speed_mps = 0.5;
+  rig.run(seconds{3});
+  EXPECT_TRUE(rig.sut.open());
+  EXPECT_EQ(rig.sut.counters().releases, 1U);
+  EXPECT_EQ(rig.sut.counters().unsafe, 0U);
+}
+
+TEST(PackageRelease, SpeaksAtOnceAfterTheStartAndAgainAfterExactlyASecond) {
+  Rig rig;
+  rig.in.wanted = false;
+  std::vector<std::size_t> said;
+  for (const milliseconds at : {milliseconds{0}, milliseconds{999}, milliseconds{1000}}) {
+    EXPECT_EQ(rig.sut.step(MonotonicTime{at}, rig.in), Status::kOk);
+    said.push_back(rig.said().size());
+  }
+  EXPECT_EQ(said, (std::vector<std::size_t>{1, 1, 2}));
+}
+
+TEST(PackageRelease, NeedsNoLine) {
+  Rig rig;
+  PackageRelease sut{{}, rig.gate, nullptr};
+  EXPECT_EQ(sut.step(rig.now, rig.in), Status::kOk);
+}
+
 TEST(PackageRelease, DoesNotAllocate) {
   Rig rig;
   rig.bus.sent.reserve(8);

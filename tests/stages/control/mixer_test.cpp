@@ -48,6 +48,22 @@ TEST(Mixer, GivesUpYawFirstThenThrustAndKeepsRollAndPitch) {
   EXPECT_LT(w.thrust_N, 90.0);
 }
 
+// Yaw adds to two motors what it takes from the other two: at three quarters of the thrust (18.375 N each) a quarter of 24.5 N is left
+// above, at one quarter as much below. So one pair ends at its limit, the other one as far from its middle: 2 x 2 x 6.125 N turn.
+TEST(Mixer, GivesYawAllThatTheWorstMotorHasLeft) {
+  const VehicleModel airframe;
+  const double left_N = 0.25 * airframe.max_thrust_N;
+  for (const double thrust : {0.25, 0.75}) {
+    for (const double sign : {-1.0, 1.0}) {
+      const Wrench w = wrench(
+          airframe, mix(airframe, thrust * 4.0 * airframe.max_thrust_N, Vector3(0.0, 0.0, 100.0 * sign)));
+      EXPECT_NEAR(w.torque_B_Nm.z(), sign * 4.0 * left_N * airframe.yaw_torque_m, 1e-9);
+      EXPECT_NEAR(w.torque_B_Nm.head<2>().norm(), 0.0, 1e-9);
+      EXPECT_NEAR(w.thrust_N, thrust * 4.0 * airframe.max_thrust_N, 1e-9);
+    }
+  }
+}
+
 TEST(Mixer, ScalesRollAndPitchTogetherWhenEvenTheyDoNotFit) {
   const VehicleModel airframe;
   const Wrench w = wrench(airframe, mix(airframe, 44.0, Vector3(30.0, 15.0, 0.0)));

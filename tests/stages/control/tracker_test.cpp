@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "tests/support/no_alloc_scope.hpp"
 
@@ -48,6 +50,42 @@ TEST(Tracker, TheIntegralStopsAtItsLimitAndForgets) {
   tracker.reset();
   ASSERT_EQ(tracker.step(in, command), Status::kOk);
   EXPECT_NEAR(total(command) * config.vehicle.max_thrust_N, config.vehicle.mass_kg * 9.81, 1e-9);
+}
+
+/// What turns the vehicle about its z axis: front left and rear right one way, the others the other way.
+double yaw_torque_Nm(const VehicleModel& vehicle, const firmware_if::MotorCommand& c) {
+  const auto& r = c.thrust_ratio;
+  return vehicle.yaw_torque_m * vehicle.max_thrust_N * (r[0] - r[1] - r[2] + r[3]);
+}
+
+// Level, the error is a turn about z alone, of which the controller takes the sine. Attitude about z is wanted less than tilt: 0.4.
+TEST(Tracker, TurnsToTheYawThatIsWantedTheShorterWayRound) {
+  const Tracker::Config config;
+  const VehicleModel& vehicle = config.vehicle;
+  for (const auto& [is_rad, wanted_rad] :
+       {std::pair{0.0, 0.03}, {0.0, -0.03}, {1.0, 1.04}, {3.13, -3.13}, {-2.0, -2.02}}) {
+    Tracker tracker(config);
+    Tracker::Input in;
+    in.state.q_WB = Quaternion(Eigen::AngleAxisd(is_rad, Vector3::UnitZ()));
+    in.yaw_rad = wanted_rad;
+    firmware_if::MotorCommand command;
+    ASSERT_EQ(tracker.step(in, command), Status::kOk);
+    const double rate_radps = 0.4 * config.attitude_gain_Hz * std::sin(wanted_rad - is_rad);
+    const double torque_Nm = config.rate_gain_Hz * vehicle.inertia_z_kgm2 * rate_radps;
+    EXPECT_NEAR(yaw_torque_Nm(vehicle, command), torque_Nm, 1e-9) << is_rad << " to " << wanted_rad;
+    EXPECT_NEAR(total(command) * vehicle.max_thrust_N, vehicle.mass_kg * 9.81, 1e-9);
+  }
+}
+
+TEST(Tracker, BrakesATurn) {
+  const Tracker::Config config;
+  Tracker tracker(config);
+  Tracker::Input in;
+  in.state.w_WB_B.z() = 0.1;
+  firmware_if::MotorCommand command;
+  ASSERT_EQ(tracker.step(in, command), Status::kOk);
+  EXPECT_NEAR(yaw_torque_Nm(config.vehicle, command),
+              -0.1 * config.rate_gain_Hz * config.vehicle.inertia_z_kgm2, 1e-9);
 }
 
 TEST(Tracker, KeepsTheTiltLimit) {
