@@ -140,7 +140,7 @@ void add_feed_command(CLI::App& app, std::function<int()>& run) {
   add_recording_arguments(*files, options->recording);
   files->add_option("--port", options->port, "of the images: NAME, or a file")->required();
   files->add_option("--odometry", options->odometry, "the poses, too: NAME, or a file");
-  add_number(*files, "--rate", options->rate_Hz, 0.1, 200.0, "images a second");
+  add_number(*files, "--rate", options->rate_Hz, 0.1, 200.0, "images per second");
   files->add_flag("--loop", options->loop, "from the beginning again, until it is interrupted");
   files->callback([options, &run] { run = [options] { return feed_files(*options); }; });
 }

@@ -316,7 +316,7 @@ void add_port_command(CLI::App& app, std::function<int()>& run) {
   list_app->add_flag("--json", options->json, "One object per port: port, device, written_to, reason");
   list_app->callback([options, &run] { run = [options] { return list_ports(options->json); }; });
 
-  CLI::App* watch_app = port_app->add_subcommand("watch", "Rate, age and content of one port, once a second");
+  CLI::App* watch_app = port_app->add_subcommand("watch", "Rate, age and content of one port, once per second");
   watch_app->add_option("port", options->name, "NAME, or a file")->required();
   add_number(*watch_app, "--seconds", options->watch_s, 0.1, 1e9,
              "Stop after this many seconds; default: at Ctrl-C (exit code 130)")
@@ -330,7 +330,7 @@ void add_port_command(CLI::App& app, std::function<int()>& run) {
       "check", "Could a flight use these ports? Exit code 1: not all of them, and it says why");
   check_app->add_option("port", options->names, "NAME, or a file; several")->required();
   add_number(*check_app, "--seconds", options->check_s, 0.1, 60.0, "How long each is watched, 0.1 .. 60");
-  check_app->add_flag("--json", options->json, "One object a port");
+  check_app->add_flag("--json", options->json, "One object per port");
   check_app->callback([options, &run] {
     run = [options] { return check_ports(options->names, options->check_s, options->json); };
   });

@@ -63,6 +63,18 @@ page; echo '# Alone' >"$tree/core/alone.md"; expect refuses links "a page that n
 page; mkdir -p "$tree/build"; echo '[a](none.md)' >"$tree/build/README.md"; expect passes links "a page of a build"
 fresh; expect refuses links "nothing to check"
 
+if command -v codespell >/dev/null; then
+  page 'Two rows per decision, 5 ms per scan.'; expect passes prose "a clean page"
+  for line in 'Two rows a decision.' 'It takes 5 ms a scan.' 'It is blazingly fast.' 'This is obviously so.' 'We utilise it.' 'TODO: more' 'It recieves.'; do
+    page "$line"; expect refuses prose "$line"
+  done
+  page '`once a second` in code'; expect passes prose "code in a page"
+  page; echo 'auto x = "once a second";' >"$tree/platform/app/bad.cpp"
+  expect refuses prose "a help text"
+  page; for ((i = 0; i < 130; ++i)); do echo; done >>"$tree/README.md"; expect refuses prose "a README of 130 lines"
+  fresh; expect refuses prose "nothing to check"
+fi
+
 # lines COUNT TEXT: the text, so many times.
 lines() { for ((i = 0; i < $1; ++i)); do printf '%s\n' "$2"; done; }
 for folder in firmware_if core governor stages platform/flight; do
