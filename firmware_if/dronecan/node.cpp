@@ -13,10 +13,9 @@ constexpr std::uint8_t kFullyArmed = 255;
 constexpr std::size_t kIdBytesAStage = 6;
 
 // Only what we use reaches a parser: dangerous services (restart, parameters, firmware) are not compiled in.
-constexpr std::array<DataType, 12> kSubscribed{
-    kType<EscStatus>,      kType<RawImu>,        kType<AhrsSolution>,     kType<GnssFix2>,
-    kType<StaticPressure>, kType<BatteryInfo>,   kType<RangeMeasurement>, kType<HardpointStatus>,
-    kType<NodeStatus>,     kType<EscRawCommand>, kType<Allocation>,       kType<GetNodeInfoRequest>};
+constexpr std::array<DataType, 7> kSubscribed{
+    kType<EscStatus>,     kType<BatteryInfo>, kType<HardpointStatus>,   kType<NodeStatus>,
+    kType<EscRawCommand>, kType<Allocation>,  kType<GetNodeInfoRequest>};
 
 }  // namespace
 
@@ -154,18 +153,8 @@ void Node::take(const Transfer& transfer, MonotonicTime now) noexcept {
       }
       return;
     }
-    case kType<RawImu>.id:
-      return keep(transfer, inbox_.imu);
-    case kType<AhrsSolution>.id:
-      return keep(transfer, inbox_.ahrs);
-    case kType<GnssFix2>.id:
-      return keep(transfer, inbox_.gnss);
-    case kType<StaticPressure>.id:
-      return keep(transfer, inbox_.pressure);
     case kType<BatteryInfo>.id:
       return keep(transfer, inbox_.battery);
-    case kType<RangeMeasurement>.id:
-      return keep(transfer, inbox_.range);
     case kType<HardpointStatus>.id:
       return keep(transfer, inbox_.hardpoint);
     case kType<NodeStatus>.id:

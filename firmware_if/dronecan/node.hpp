@@ -25,15 +25,10 @@ struct Heard {
   std::uint64_t count{};
 };
 
-/// Everything that the runtime listens to.
+/// What the motors' side listens to. Sensors are heard by who reads all of their samples (platform/live/bus_sensors).
 struct Inbox {
   std::array<Heard<EscStatus>, 20> esc{};  ///< By esc_index.
-  Heard<RawImu> imu;
-  Heard<AhrsSolution> ahrs;
-  Heard<GnssFix2> gnss;
-  Heard<StaticPressure> pressure;
   Heard<BatteryInfo> battery;
-  Heard<RangeMeasurement> range;
   Heard<HardpointStatus> hardpoint;
 };
 

@@ -29,6 +29,8 @@ struct PlantOptions {
   double pilot_s{0.0};
   double seconds{0.0};
   bool no_pictures{false};
+  bool bus_sensors{false};
+  std::string can;
   bool json{false};
 };
 
@@ -44,10 +46,13 @@ std::string far_end_of(const mavlink::LinkAddress& link) {
 
 /// What flies in this world.
 std::string run_line(const PlantOptions& options, const sitl::World& world, const live::PlantConfig& config) {
-  const std::string link =
-      config.autopilot ? fmt::format("{} --autopilot {} --arm --port {}", far_end_of(config.autopilot->link),
-                                     options.autopilot, options.common.port)
-                       : "port:" + options.common.port;
+  std::string link = "port:" + options.common.port;
+  if (config.on_bus)
+    link = (options.can.empty() ? "dronecan:" + link : "dronecan:INTERFACE --port " + options.common.port) +
+           " --wait 60";
+  if (config.autopilot)
+    link = fmt::format("{} --autopilot {} --arm --port {}", far_end_of(config.autopilot->link),
+                       options.autopilot, options.common.port);
   std::string line =
       fmt::format("roborun run --vehicle {} --link {} --goal {} --bounds={},{}", options.common.vehicle, link,
                   text_of(world.goal_W()), text_of(world.bounds_W().min_W), text_of(world.bounds_W().max_W));
@@ -113,6 +118,10 @@ int plant(const PlantOptions& options) {
   config.pictures = !options.no_pictures;
   if (const auto origin = origin_of(options.origin)) config.origin = *origin;
   config.autopilot = autopilot_of(options);
+  if (options.bus_sensors || !options.can.empty()) {
+    if (config.autopilot) throw InputError("--bus-sensors, --can: go without --autopilot");
+    config.on_bus = {options.can};
+  }
   if (options.seconds > 0.0) config.seconds = options.seconds;
   const sitl::World world = plant_world(options.common, config.mission);
   const input::StopOnSignal stop;
@@ -176,6 +185,13 @@ void add_plant_command(CLI::App& app, std::function<int()>& run) {
   add_number(*command, "--seconds", options->seconds, 0.1, 86400.0,
              "End after this time at the latest; default: as long as it takes")
       ->default_str("");
+  command->add_flag(
+      "--bus-sensors", options->bus_sensors,
+      "IMU, receiver and barometer are nodes on the vehicle's CAN bus (RawIMU, Fix2, ...): for roborun run "
+      "--link dronecan:port:NAME");
+  command->add_option(
+      "--can", options->can,
+      "That bus is this interface of the kernel: for roborun run --link dronecan:INTERFACE on the other end");
   command->add_flag("--no-pictures", options->no_pictures,
                     "Depth images and clouds are made by a process of their own: roborun feed plant");
   command->add_flag("--json", options->json, "One JSON object on standard output, nothing else");

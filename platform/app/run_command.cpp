@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "platform/app/earth_argument.hpp"
 #include "platform/app/exit_code.hpp"
@@ -35,6 +36,9 @@ struct RunOptions {
   bool tune{false};
   bool arm{false};
   bool guard{false};
+  std::vector<std::string> kill_lines;
+  std::string arm_line;
+  bool active_low{false}, pull_up{false};
   std::string profile{"host"};
   std::string seed{"1"};
   double cruise_m{0.0};
@@ -91,6 +95,18 @@ std::optional<mission::AutopilotChoice> autopilot_of(const RunOptions& options, 
   return mission::AutopilotChoice{*kind, options.tune};
 }
 
+live::BusLines lines_of(const RunOptions& options, const live::Link& link) {
+  live::BusLines lines;
+  if ((!options.kill_lines.empty() || !options.arm_line.empty()) && !link.dronecan)
+    throw InputError("--kill-lines, --arm-line: go with --link dronecan:INTERFACE");
+  const auto bias = options.pull_up ? firmware_if::GpioBias::kPullUp : firmware_if::GpioBias::kNone;
+  const auto line = [&](const std::string& name) { return gpio::LineConfig{name, options.active_low, bias}; };
+  if (!options.kill_lines.empty())
+    lines.kill = {line(options.kill_lines.at(0)), line(options.kill_lines.at(1))};
+  if (!options.arm_line.empty()) lines.arm = line(options.arm_line);
+  return lines;
+}
+
 /// The route of --mission, and where it begins.
 void take_mission(const RunOptions& options, live::LiveConfig& config) {
   if (options.cruise_m > 0.0) throw InputError("--cruise: goes with --goal: a mission has its take-off");
@@ -120,6 +136,7 @@ void check(const RunOptions& options, const live::LiveConfig& config) {
 live::LiveConfig config_of(const RunOptions& options) {
   live::LiveConfig config;
   config.link = live::link_of(options.link, options.port);
+  config.lines = lines_of(options, config.link);
   config.origin = origin_of(options.origin);
   if (!options.ground.empty()) config.ground.link = mavlink::parse_link(options.ground);
   config.ground.sysid = static_cast<std::uint8_t>(options.ground_id);
@@ -295,6 +312,10 @@ void add_run_command(CLI::App& app, std::function<int()>& run) {
       "Example, in two terminals:\n"
       "  roborun plant --vehicle paper --env 14 --seed 1 --port demo\n"
       "  roborun run --vehicle paper --link port:demo --goal 900,0,5 --bounds=-100,-100,1.5,1000,100,10\n"
+      "With its sensors, too, on the CAN bus (dronecan:can0 --port demo for a real one):\n"
+      "  roborun plant --vehicle paper --env 14 --seed 1 --port demo --bus-sensors\n"
+      "  roborun run --vehicle paper --link dronecan:port:demo --wait 60 --goal 900,0,5 "
+      "--bounds=-100,-100,1.5,1000,100,10\n"
       "With an autopilot between, a fake one:\n"
       "  roborun plant --vehicle paper --env 14 --seed 1 --port demo --autopilot px4\n"
       "  roborun run --vehicle paper --link udpin://127.0.0.1:14540 --port demo --autopilot px4 --arm --goal "
@@ -308,12 +329,27 @@ void add_run_command(CLI::App& app, std::function<int()>& run) {
                    "Vehicle: a shipped one (roborun vehicle list), or a vehicle file")
       ->capture_default_str();
   command
-      ->add_option("--link", options->link,
-                   "The way to the vehicle: port:NAME (sensor ports of this machine), or to its autopilot: "
-                   "udpin://[HOST]:PORT, udpout://HOST:PORT, tcp://HOST:PORT, serial:///dev/NAME:BAUD")
+      ->add_option(
+          "--link", options->link,
+          "The way to the vehicle: port:NAME (sensor ports of this machine), dronecan:INTERFACE (its "
+          "CAN bus; dronecan:port:NAME for a bus made of ports), or to its autopilot: "
+          "udpin://[HOST]:PORT, udpout://HOST:PORT, tcp://HOST:PORT, serial:///dev/NAME:BAUD")
       ->required();
-  command->add_option("--port", options->port,
-                      "With a link to an autopilot: NAME of the ports of the vehicle's depth images");
+  command->add_option(
+      "--port", options->port,
+      "With a link to an autopilot or a CAN bus: NAME of the ports of the vehicle's depth images "
+      "(with a bus also of its lines and odometry)");
+  auto* kill_lines = command->add_option("--kill-lines", options->kill_lines,
+                                         "With a CAN bus: the kill switch on lines of this machine, normally "
+                                         "open and normally closed contact, each a "
+                                         "name or CHIP:OFFSET [the port NAME-lines]");
+  kill_lines->expected(2)->delimiter(',');
+  command->add_option("--arm-line", options->arm_line,
+                      "With a CAN bus: the arming switch on a line of this machine "
+                      "[the port NAME-lines]");
+  command->add_flag("--active-low", options->active_low, "A closed contact pulls its line low")
+      ->needs(kill_lines);
+  command->add_flag("--pull-up", options->pull_up, "Switch on the pull-up of the lines")->needs(kill_lines);
   command
       ->add_option("--autopilot", options->autopilot,
                    "Who flies at the far end of a MAVLink link: px4 or arducopter")

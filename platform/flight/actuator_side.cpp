@@ -12,10 +12,11 @@ constexpr Nanos kBatterySilence{500'000'000};
 }  // namespace
 
 ActuatorSide::ActuatorSide(Nanos minor_frame, firmware_if::CanBus& bus, firmware_if::GpioInput& open,
-                           firmware_if::GpioInput& closed) noexcept
+                           firmware_if::GpioInput& closed, Arming arming) noexcept
     : gate_({.beat_timeout = 3 * minor_frame}, bus),
       node_({.command_period = minor_frame}, gate_, bus, sessions_),
-      kill_switch_(open, closed) {}
+      kill_switch_(open, closed),
+      arming_(arming) {}
 
 Status ActuatorSide::command(const firmware_if::MotorCommand& command) noexcept {
   for (const double ratio : command.thrust_ratio) {
@@ -23,8 +24,15 @@ Status ActuatorSide::command(const firmware_if::MotorCommand& command) noexcept 
   }
   command_ = command;
   commanded_ = true;
-  if (!armed_ && !disarmed_) armed_ = gate_.arm_unproven() == Status::kOk;
+  if (!armed_ && !disarmed_)
+    armed_ = (arming_ == Arming::kProven ? gate_.arm(kill_switch_) : gate_.arm_unproven()) == Status::kOk;
   return Status::kOk;
+}
+
+Status ActuatorSide::forget_proof() noexcept {
+  if (armed_ || disarmed_) return Status::kInvalidArgument;
+  if (const Status status = kill_switch_.reset(); status != Status::kOk) return status;
+  return gate_.reset_kill(kill_switch_);
 }
 
 void ActuatorSide::disarm() noexcept {

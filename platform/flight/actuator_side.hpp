@@ -14,15 +14,17 @@
 
 namespace roborun::flight {
 
-/// Each minor frame: the flight lane may command(), then step() sends. Arms itself with the first command,
-/// without the proof that the kill switch works: for simulation and motors without propellers.
+/// What arming asks for. Without the proof that the kill switch works: for simulation and motors without propellers.
+enum class Arming : std::uint8_t { kUnproven, kProven };
+
+/// Each minor frame: the flight lane may command(), then step() sends. Arms itself with the first command.
 /// RT-safe: O(1), no allocation.
 class ActuatorSide final : public firmware_if::Motors {
  public:
   /// `bus` is the vehicle's end; `open` and `closed` are the contacts of the kill switch. All outlive the
   /// object. The gate closes after three minor frames without a command.
   ActuatorSide(Nanos minor_frame, firmware_if::CanBus& bus, firmware_if::GpioInput& open,
-               firmware_if::GpioInput& closed) noexcept;
+               firmware_if::GpioInput& closed, Arming arming = Arming::kUnproven) noexcept;
   ActuatorSide(const ActuatorSide&) = delete;
   ActuatorSide& operator=(const ActuatorSide&) = delete;
 
@@ -31,9 +33,15 @@ class ActuatorSide final : public firmware_if::Motors {
   /// The end of a minor frame: samples the kill switch, hears and sends.
   void step(MonotonicTime now) noexcept;
   /// Motors off for good, by the runtime itself.
-  void terminate() noexcept { gate_.kill(); }
+  void terminate() noexcept {
+    gate_.kill();
+    disarmed_ = true;
+  }
   /// After a landing: zeros, and no arming by a later command.
   void disarm() noexcept;
+  /// On the ground, before anything was commanded: a switch that was pressed to show that it works is forgotten once it
+  /// stands on "run" again. kNotReady: it does not. kInvalidArgument: motors were commanded, or terminated.
+  [[nodiscard]] Status forget_proof() noexcept;
   /// A twin for tests: the kill switch has no effect.
   void ignore_kill_switch() noexcept { ignores_kill_switch_ = true; }
 
@@ -52,6 +60,7 @@ class ActuatorSide final : public firmware_if::Motors {
   firmware_if::dronecan::Node node_;
   firmware_if::KillSwitch kill_switch_;
   firmware_if::MotorCommand command_{};
+  Arming arming_;
   bool commanded_{false};  ///< This minor frame: the control cycle is alive.
   bool armed_{false};
   bool disarmed_{false};  ///< For good.

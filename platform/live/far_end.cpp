@@ -5,6 +5,22 @@
 #include <cmath>
 
 namespace roborun::live {
+namespace {
+
+constexpr Nanos kEscSilence{500'000'000};
+
+}  // namespace
+
+void look_at_power(const flight::ActuatorSide& motors, MonotonicTime now, std::vector<Need>& needs) {
+  Need escs{"ESCs", {}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto& esc = motors.node().inbox().esc[i];
+    if (esc.count == 0 || now - esc.stamp > kEscSilence)
+      escs.lacks += fmt::format("{}ESC {} is silent on the bus", escs.lacks.empty() ? "" : ", ", i + 1);
+  }
+  needs.push_back(escs);
+  needs.push_back(battery_need(motors.charge_ratio(now), "its monitor says nothing on the bus"));
+}
 
 Need battery_need(double charge_ratio, const char* unknown) {
   constexpr double kLeast_ratio = 0.3;

@@ -11,6 +11,7 @@
 #include "firmware_if/lidar.hpp"
 #include "firmware_if/mavlink/flight_messages.hpp"
 #include "firmware_if/mavlink/goal_request.hpp"
+#include "platform/flight/actuator_side.hpp"
 #include "platform/flight/aircraft.hpp"
 #include "platform/sensor_port/port_navigation.hpp"
 
@@ -31,6 +32,8 @@ struct PortUse {
   std::uint64_t stale{};    ///< Silences that lasted longer than the device may be silent.
 };
 
+/// What ESCs and the battery's monitor lack, as heard on the bus.
+void look_at_power(const flight::ActuatorSide& motors, MonotonicTime now, std::vector<Need>& needs);
 /// Enough for a flight is left, by what its monitor says; NaN: `unknown`.
 [[nodiscard]] Need battery_need(double charge_ratio, const char* unknown);
 

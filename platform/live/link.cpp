@@ -21,30 +21,42 @@ void check_port_name(const std::string& option, const std::string& name) {
                     option, name, kMost));
 }
 
+namespace {
+
+void need_ports(const std::string& port) {
+  if (port.empty()) throw InputError("--port: must name the ports of the vehicle's depth images");
+  check_port_name("--port", port);
+}
+
+}  // namespace
+
 Link link_of(const std::string& text, const std::string& port) {
   if (text.find("://") != std::string::npos) {
-    if (port.empty()) throw InputError("--port: must name the ports of the vehicle's depth images");
-    check_port_name("--port", port);
+    need_ports(port);
     try {
       return {port, mavlink::parse_link(text)};
     } catch (const InputError& error) {
       throw InputError(fmt::format("--link: {}", error.what()));
     }
   }
-  if (!port.empty()) throw InputError("--port: goes with a MAVLink --link: port:NAME has them all");
-  const std::size_t colon = text.find(':');
-  const std::string kind = text.substr(0, colon);
-  const std::string rest = colon == std::string::npos ? "" : text.substr(colon + 1);
-  if (kind == "dronecan")
-    throw InputError(fmt::format(
-        "--link: {}: sensors from the bus (RawIMU, Fix2, pressure) are not there yet: must be port:NAME",
-        text));
-  if (kind != "port" || colon == std::string::npos)
-    throw InputError(fmt::format(
-        "--link: '{}' is no way to a vehicle: must be port:NAME, or a MAVLink URL (udpin://[HOST]:PORT, ...)",
-        text));
-  check_port_name("--link", rest);
-  return {rest, std::nullopt};
+  const auto after = [](const std::string& word, const std::string& start) {
+    return word.rfind(start, 0) == 0 ? std::optional(word.substr(start.size())) : std::nullopt;
+  };
+  const auto bus = after(text, "dronecan:");
+  const auto name = after(bus.value_or(text), "port:");
+  if (bus && !name) {
+    if (bus->empty()) throw InputError("--link: dronecan: must be followed by an interface: dronecan:can0");
+    need_ports(port);
+    return {port, std::nullopt, *bus};
+  }
+  if (!port.empty()) throw InputError("--port: goes with a MAVLink or CAN --link: port:NAME has them all");
+  if (!name)
+    throw InputError(
+        fmt::format("--link: '{}' is no way to a vehicle: must be port:NAME, dronecan:INTERFACE, or a "
+                    "MAVLink URL (udpin://[HOST]:PORT, ...)",
+                    text));
+  check_port_name("--link", *name);
+  return {*name, std::nullopt, bus ? std::optional<std::string>("") : std::nullopt};
 }
 
 }  // namespace roborun::live

@@ -12,6 +12,7 @@
 #include "core/executive/lane_meter.hpp"
 #include "platform/flight/watchdog_program.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/live/bus_aircraft.hpp"
 #include "platform/live/flight_end.hpp"
 #include "platform/live/mavlink_aircraft.hpp"
 #include "platform/live/port_aircraft.hpp"
@@ -57,6 +58,13 @@ std::unique_ptr<FarEnd> far_end_of(const LiveConfig& config, const rt::Monotonic
     return std::make_unique<MavlinkAircraft>(
         *config.link.mavlink, *config.autopilot, sensor_port::VehiclePorts(config.link.name), config.rig,
         clock, clock.epoch(), config.route ? config.origin : std::nullopt, config.key);
+  if (config.link.dronecan) {
+    const sensor_port::VehiclePorts ports(config.link.name);
+    auto wire = config.link.dronecan->empty() ? port_wire(ports, clock.epoch())
+                                              : kernel_wire(*config.link.dronecan, clock.epoch());
+    return std::make_unique<BusAircraft>(std::move(wire), ports, config.rig, config.flight.minor_frame,
+                                         clock.epoch(), config.origin, config.lines);
+  }
   return std::make_unique<PortAircraft>(config.link.name, config.rig, config.flight.minor_frame,
                                         clock.epoch(), config.origin);
 }

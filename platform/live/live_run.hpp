@@ -11,6 +11,7 @@
 #include "core/sensor_rig.hpp"
 #include "firmware_if/mavlink/companion.hpp"
 #include "platform/flight/flight_config.hpp"
+#include "platform/live/bus_wire.hpp"
 #include "platform/live/far_end.hpp"
 #include "platform/live/ground.hpp"
 #include "platform/live/link.hpp"
@@ -23,6 +24,7 @@ struct LiveConfig {
   flight::FlightConfig flight{};  ///< Whole: vehicle, rig's numbers, bounds, goal, cruise height, prices.
   SensorRig rig{};
   Link link{};
+  BusLines lines{};  ///< Of a vehicle on a CAN bus.
   std::optional<firmware_if::mavlink::Companion::Config>
       autopilot{};  ///< If and only if the link is a MAVLink one; `flight` is as it flies.
   std::optional<sensor_port::EarthPlace>

@@ -18,6 +18,7 @@ struct PlantConfig {
   std::string port;                                            ///< As of sensor_port::VehiclePorts.
   sensor_port::EarthPlace origin{47.397742, 8.545594, 488.0};  ///< Of the world's (0, 0, 0).
   std::optional<PlantAutopilot> autopilot{};                   ///< None: the runtime has sensors and motors.
+  std::optional<PlantBus> on_bus{};                            ///< None: its sensors are ports.
   bool pictures{
       true};  ///< False: depth images and clouds are made by another process (live::feed_pictures()).
   double seconds{std::numeric_limits<double>::infinity()};

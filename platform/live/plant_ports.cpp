@@ -73,13 +73,15 @@ void PicturePorts::write(std::size_t lidar, const firmware_if::LidarSweep& sweep
 }
 
 NavigationPorts::NavigationPorts(const SensorRig& rig, const sensor_port::VehiclePorts& ports,
-                                 const sensor_port::EarthPlace& origin)
+                                 const sensor_port::EarthPlace& origin, bool on_bus)
     : frame_(origin), origin_height_m_(origin.height_m) {
-  open(imu_, ports.imu(), ROBORUN_PORT_IMU, 0, kSampleSlots);
-  if (rig.gnss != GnssModel::kNone) open(gnss_, ports.gnss(), ROBORUN_PORT_GNSS, 0, kSampleSlots);
+  if (!on_bus) {
+    open(imu_, ports.imu(), ROBORUN_PORT_IMU, 0, kSampleSlots);
+    if (rig.gnss != GnssModel::kNone) open(gnss_, ports.gnss(), ROBORUN_PORT_GNSS, 0, kSampleSlots);
+    open(pressure_, ports.pressure(), ROBORUN_PORT_PRESSURE, 0, kSampleSlots);
+  }
   if (rig.odometry != OdometryModel::kNone)
     open(odometry_, ports.odometry(), ROBORUN_PORT_ODOMETRY, 0, kSampleSlots);
-  open(pressure_, ports.pressure(), ROBORUN_PORT_PRESSURE, 0, kSampleSlots);
   open(lines_, ports.lines(), ROBORUN_PORT_LINES, 0, kSampleSlots);
 }
 
@@ -144,7 +146,8 @@ void TruthPort::write(MonotonicTime now, const Vector3& p_WB, const Quaternion& 
 
 void NavigationPorts::write_lines(MonotonicTime now, std::uint32_t active, std::uint32_t gone,
                                   Nanos shift) noexcept {
-  constexpr std::uint32_t kAll = ROBORUN_PORT_KILL_OPEN | ROBORUN_PORT_KILL_CLOSED | ROBORUN_PORT_OPERATOR;
+  constexpr std::uint32_t kAll =
+      ROBORUN_PORT_KILL_OPEN | ROBORUN_PORT_KILL_CLOSED | ROBORUN_PORT_OPERATOR | ROBORUN_PORT_ARM;
   roborun_port_lines s{};
   s.at = stamp_of(now, ++lines_written_, shift);
   s.wired = kAll & ~gone;

@@ -40,9 +40,9 @@ class PicturePorts {
 /// IMU, receiver, odometry, pressure, lines, and the vehicle's end of the bus. One thread.
 class NavigationPorts {
  public:
-  /// Makes what this rig has. The world's origin is at `origin`. Throws InputError.
+  /// Makes what this rig has; `on_bus`: but for IMU, receiver and pressure. The world's origin is at `origin`. Throws InputError.
   NavigationPorts(const SensorRig& rig, const sensor_port::VehiclePorts& ports,
-                  const sensor_port::EarthPlace& origin);
+                  const sensor_port::EarthPlace& origin, bool on_bus = false);
   void write(const firmware_if::ImuSample& sample, Nanos shift) noexcept;
   void write(const firmware_if::GnssFix& fix, Nanos shift) noexcept;
   void write(const firmware_if::BarometerSample& sample, Nanos shift) noexcept;

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 
+#include "platform/can/socket_can.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/live/plant_bus.hpp"
 #include "platform/live/plant_ports.hpp"
 #include "platform/sensor_port/port_bus.hpp"
 #include "platform/sitl/autopilot/fake_autopilot.hpp"
@@ -17,38 +19,53 @@ namespace {
 class PortSide final : public PlantSide {
  public:
   PortSide(sitl::SimulatedPlant& plant, const SensorRig& rig, const sensor_port::VehiclePorts& names,
-           const sensor_port::EarthPlace& origin)
-      : plant_(plant), bus_out_(names.bus_out()), navigation_(rig, names, origin) {
+           const sensor_port::EarthPlace& origin, const std::optional<PlantBus>& on_bus)
+      : plant_(plant), bus_out_(names.bus_out()), navigation_(rig, names, origin, on_bus.has_value()) {
+    if (on_bus) nodes_.emplace(plant.far_side().spare_bus(), origin);
+    if (on_bus && !on_bus->interface.empty()) {
+      if (const std::string wrong = kernel_.emplace().open(on_bus->interface); !wrong.empty())
+        throw InputError("--can: " + wrong);
+      return;
+    }
     const std::string wrong = bus_.speak(names.bus_in(), {});
     if (!wrong.empty()) throw InputError(fmt::format("{}: {}", names.bus_in(), wrong));
   }
 
   /// The runtime makes the port on which it speaks.
   void listen() override {
+    if (kernel_) return;
     if (!listens_ || bus_.reader().is_replaced()) listens_ = bus_.listen(bus_out_, {}).empty();
   }
 
   bool hear(MonotonicTime clock_now) override {
-    (void)clock_now;
     constexpr int kMost = 64;
     const std::uint64_t before = commands_;
     firmware_if::CanFrame frame;
-    for (int i = 0; i < kMost && bus_.receive(frame) == Status::kOk; ++i) {
+    for (int i = 0; i < kMost && wire().receive(frame) == Status::kOk; ++i) {
       ++commands_;
       // The simulated wire knows no frame that is yet to be made, and the world is up to a minor frame behind.
       frame.stamp = std::min(MonotonicTime{frame.stamp.time_since_epoch() - shift_}, plant_.now());
       (void)plant_.far_side().bus().send({&frame, 1});
     }
     plant_.far_side().break_lines(plant_.now());
+    if (nodes_) operator_.step(clock_now, commands_ != before);
     return commands_ != before;
   }
 
   void tell(MonotonicTime clock_now, Nanos shift) override {
-    (void)clock_now;
     shift_ = shift;
     sitl::FaultySensors& sensors = plant_.sensors();
+    if (nodes_) nodes_->step(plant_.now(), clock_now - plant_.now());
     const auto pass = [&](auto sample) {
-      while (sensors.read(sample) == Status::kOk) navigation_.write(sample, shift);
+      while (sensors.read(sample) == Status::kOk) {
+        if constexpr (requires { nodes_->say(sample); }) {
+          if (nodes_) {
+            nodes_->say(sample);
+            continue;
+          }
+        }
+        navigation_.write(sample, shift);
+      }
     };
     pass(firmware_if::ImuSample{});
     pass(firmware_if::GnssFix{});
@@ -57,7 +74,7 @@ class PortSide final : public PlantSide {
     firmware_if::CanFrame frame;
     while (plant_.far_side().bus().receive(frame) == Status::kOk) {
       frame.stamp += shift;
-      (void)bus_.send({&frame, 1});
+      (void)wire().send({&frame, 1});
     }
     std::uint32_t active = plant_.hears_operator() ? ROBORUN_PORT_OPERATOR : 0;
     std::uint32_t gone = 0;
@@ -68,17 +85,35 @@ class PortSide final : public PlantSide {
     };
     look(plant_.far_side().kill_open(), ROBORUN_PORT_KILL_OPEN);
     look(plant_.far_side().kill_closed(), ROBORUN_PORT_KILL_CLOSED);
+    if (operator_.presses_kill())
+      active = (active | ROBORUN_PORT_KILL_OPEN) & ~std::uint32_t{ROBORUN_PORT_KILL_CLOSED};
+    if (operator_.arms()) active |= ROBORUN_PORT_ARM;
     navigation_.write_lines(plant_.now(), active, gone, shift);
+  }
+  void left_ground(MonotonicTime clock_now) override {
+    (void)clock_now;
+    operator_.flies();
   }
 
   [[nodiscard]] std::uint64_t commands() const override { return commands_; }
-  [[nodiscard]] std::uint64_t lost() const override { return bus_.reader().counters().dropped; }
+  [[nodiscard]] std::uint64_t lost() const override {
+    if (kernel_) return kernel_->counters().lost_on_receive + kernel_->counters().refused;
+    return bus_.reader().counters().dropped;
+  }
 
  private:
+  [[nodiscard]] firmware_if::CanBus& wire() noexcept {
+    if (kernel_) return *kernel_;
+    return bus_;
+  }
+
   sitl::SimulatedPlant& plant_;
   std::string bus_out_;
   NavigationPorts navigation_;
   sensor_port::PortCan bus_;
+  std::optional<can::SocketCan> kernel_;  ///< Instead of bus_.
+  std::optional<SensorNodes> nodes_;      ///< None: the sensors are ports.
+  PlantOperator operator_;
   Nanos shift_{0};
   bool listens_{false};
   std::uint64_t commands_{0};
@@ -162,8 +197,9 @@ class AutopilotSide final : public PlantSide {
 
 std::unique_ptr<PlantSide> port_side(sitl::SimulatedAircraft& body, const SensorRig& rig,
                                      const sensor_port::VehiclePorts& names,
-                                     const sensor_port::EarthPlace& origin) {
-  return std::make_unique<PortSide>(body.plant(), rig, names, origin);
+                                     const sensor_port::EarthPlace& origin,
+                                     const std::optional<PlantBus>& on_bus) {
+  return std::make_unique<PortSide>(body.plant(), rig, names, origin, on_bus);
 }
 
 std::unique_ptr<PlantSide> autopilot_side(sitl::SimulatedAircraft& body, const VehicleModel& vehicle,

@@ -49,10 +49,16 @@ class PlantSide {
   [[nodiscard]] virtual std::optional<PlantAutopilotReport> autopilot() const { return std::nullopt; }
 };
 
+/// IMU, receiver and barometer are nodes on the bus, and an operator proves the kill switch and arms.
+struct PlantBus {
+  std::string interface;  ///< Of the kernel; empty: the bus is made of ports.
+};
+
 /// Ports of `names`; the world's origin is at `origin`. `body` outlives it. Throws InputError.
 [[nodiscard]] std::unique_ptr<PlantSide> port_side(sitl::SimulatedAircraft& body, const SensorRig& rig,
                                                    const sensor_port::VehiclePorts& names,
-                                                   const sensor_port::EarthPlace& origin);
+                                                   const sensor_port::EarthPlace& origin,
+                                                   const std::optional<PlantBus>& on_bus);
 /// A fake autopilot, which steps `body`'s motors.
 [[nodiscard]] std::unique_ptr<PlantSide> autopilot_side(sitl::SimulatedAircraft& body,
                                                         const VehicleModel& vehicle, Nanos minor_frame,

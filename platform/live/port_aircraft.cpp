@@ -6,12 +6,6 @@
 #include <cmath>
 
 namespace roborun::live {
-namespace {
-
-constexpr Nanos kEscSilence{500'000'000};
-
-}  // namespace
-
 PortAircraft::PortAircraft(const std::string& name, const SensorRig& rig, Nanos minor_frame, Nanos epoch,
                            const std::optional<sensor_port::EarthPlace>& origin)
     : clock_{epoch},
@@ -74,14 +68,7 @@ void PortAircraft::look_at_vehicle(MonotonicTime now, std::vector<Need>& needs) 
     kill.lacks = "does not stand on run: release it, and look at both wires";
   needs.push_back(kill);
   needs.push_back({"operator", lines_.hears_operator() ? "" : "is not heard: switch the transmitter on"});
-  Need escs{"ESCs", {}};
-  for (std::size_t i = 0; i < 4; ++i) {
-    const auto& esc = actuators_.node().inbox().esc[i];
-    if (esc.count == 0 || now - esc.stamp > kEscSilence)
-      escs.lacks += fmt::format("{}ESC {} is silent on the bus", escs.lacks.empty() ? "" : ", ", i + 1);
-  }
-  needs.push_back(escs);
-  needs.push_back(battery_need(actuators_.charge_ratio(now), "its monitor says nothing on the bus"));
+  look_at_power(actuators_, now, needs);
 }
 
 std::vector<Need> PortAircraft::look(MonotonicTime now) {

@@ -48,6 +48,7 @@ class PortLines final : public PortDevice {
   /// `line`: enum roborun_port_line. Only its level is known, no edges.
   [[nodiscard]] firmware_if::GpioInput& kill_open() noexcept { return open_; }
   [[nodiscard]] firmware_if::GpioInput& kill_closed() noexcept { return closed_; }
+  [[nodiscard]] firmware_if::GpioInput& arm() noexcept { return arm_; }
   [[nodiscard]] bool hears_operator() const noexcept;
 
  private:
@@ -69,6 +70,7 @@ class PortLines final : public PortDevice {
   std::uint32_t wired_{0}, active_{0};
   Line open_{*this, ROBORUN_PORT_KILL_OPEN};
   Line closed_{*this, ROBORUN_PORT_KILL_CLOSED};
+  Line arm_{*this, ROBORUN_PORT_ARM};
 };
 
 }  // namespace roborun::sensor_port

@@ -168,7 +168,8 @@ struct roborun_port_can {
 enum roborun_port_line {
   ROBORUN_PORT_KILL_OPEN = 1,   /* normally open contact of the kill switch: active once it is pressed */
   ROBORUN_PORT_KILL_CLOSED = 2, /* normally closed contact: active until it is pressed */
-  ROBORUN_PORT_OPERATOR = 4     /* active: the operator is heard */
+  ROBORUN_PORT_OPERATOR = 4,    /* active: the operator is heard */
+  ROBORUN_PORT_ARM = 8          /* arming switch: active once motors may turn */
 };
 
 /* Levels of lines, again and again: a line that nobody writes is one that is gone. */

@@ -36,6 +36,9 @@ class SimulatedActuators {
   [[nodiscard]] firmware_if::GpioInput& kill_open() noexcept { return open_; }
   [[nodiscard]] firmware_if::GpioInput& kill_closed() noexcept { return closed_; }
 
+  /// Another end of the simulated bus, for what else speaks on it; on the bus from the first call on.
+  [[nodiscard]] firmware_if::CanBus& spare_bus() noexcept { return bus_.port(kSparePort); }
+
   /// Faults of ESCs, power module, bus and kill switch; null: none. It must outlive the object.
   void connect(const FaultLine* faults) noexcept { faults_ = faults; }
   /// Bus and contacts as their faults want them, before the vehicle's side looks at them.
@@ -46,6 +49,7 @@ class SimulatedActuators {
   [[nodiscard]] const std::array<double, 4>& throttle() const noexcept { return turning_; }
 
  private:
+  static constexpr std::size_t kSparePort = 6;
   [[nodiscard]] double break_battery(double charge_ratio) noexcept;
   [[nodiscard]] double break_esc(std::size_t i, double ratio, MonotonicTime now) noexcept;
 

@@ -17,22 +17,22 @@ with open(sys.argv[2] + "/in.jsonl", "w") as objects, open(sys.argv[2] + "/wante
         for frame in v["frames"]:
             log.write(f"({i / 1000:.6f}) can0 {frame['id'].upper()}#{frame['data'].upper()}\n")
 PY
-check "there are 108 vectors" test "$(wc -l <"$work/in.jsonl")" -eq 108
+check "there are 126 vectors" test "$(wc -l <"$work/in.jsonl")" -eq 126
 check "encode succeeds" "$roborun" can encode --json "$work/in.jsonl" >"$work/out.log"
 check "encode gives the golden frames" cmp "$work/out.log" "$work/wanted.log"
 check "decode succeeds" "$roborun" can decode --candump "$work/wanted.log" --json >"$work/out.jsonl" 2>"$work/err"
-check "decode counts" grep -q "108 transfers, 0 malformed" "$work/err"
+check "decode counts" grep -q "126 transfers, 0 malformed" "$work/err"
 check "decode gives the fields" python3 - "$work" <<'PY'
 import json, sys
 keys = ("type", "source_node_id", "priority", "transfer_id", "fields")
 rows = lambda name: [{k: o[k] for k in keys} for o in map(json.loads, open(sys.argv[1] + name))]
 wanted, got = rows("/in.jsonl"), rows("/out.jsonl")
-sys.exit(0 if len(wanted) == 108 and wanted == got else 1)
+sys.exit(0 if len(wanted) == 126 and wanted == got else 1)
 PY
 # Without the third frame of the log's longest transfers nothing of them is delivered, and each is named.
 awk '{ n[$1]++; if (n[$1] != 3) print }' "$work/wanted.log" >"$work/holes.log"
 "$roborun" can decode --candump "$work/holes.log" --json >"$work/holes.jsonl" 2>"$work/err"
-check "some transfers have holes" test "$(wc -l <"$work/holes.jsonl")" -lt 108
+check "some transfers have holes" test "$(wc -l <"$work/holes.jsonl")" -lt 126
 check "holes are named" grep -qE "line [0-9]+: [0-9A-F]{8}: (wrong toggle|missed start)" "$work/err"
 check "no transfer comes from a hole" python3 - "$work" <<'PY'
 import json, sys

@@ -29,7 +29,14 @@ fly=(--vehicle paper --goal 9,0,4 --profile paper --best-effort --wait 0)
 says 2 "nothing is there: start what writes its ports" run "${fly[@]}" --link "port:$name"
 one_line run "${fly[@]}" --link "port:$name"
 says 2 "--link: 'nix' is no way to a vehicle" run "${fly[@]}" --link nix
-says 2 "not there yet" run "${fly[@]}" --link dronecan:can0
+says 2 "--port: must name the ports" run "${fly[@]}" --link dronecan:can0
+says 2 "NOT READY bus: nocan7: " run "${fly[@]}" --link dronecan:nocan7 --port "$name"
+says 2 "NOT READY bus: /dev/shm/roborun-$name-bus-in: No such file" run "${fly[@]}" --link "dronecan:port:$name"
+says 2 "--kill-lines, --arm-line: go with --link dronecan" run "${fly[@]}" --link "port:$name" --kill-lines a,b
+says 2 "--kill-lines: not armed: " run "${fly[@]}" --link dronecan:nocan7 --port "$name" --kill-lines nix1,nix2
+says 2 "--arm-line: " run "${fly[@]}" --link dronecan:nocan7 --port "$name" --arm-line nix3
+says 2 "--can: nocan7: " plant --port "$name" --can nocan7
+says 2 "--bus-sensors, --can: go without --autopilot" plant --port "$name" --bus-sensors --autopilot px4
 says 2 "is no name of ports" run "${fly[@]}" --link "port:a b"
 says 2 "--goal: 'a' is not a point" run --link "port:$name" --goal a
 says 2 "--goal" run --link "port:$name"

@@ -9,12 +9,13 @@ name=$(basename "$folder")
 plant= run= feeder=
 trap 'kill -9 $plant $run $feeder 2>/dev/null; rm -rf "$folder" /dev/shm/roborun-$name-*' EXIT
 
+link="port:$name"
 start() {  # OPTION_OF_PLANT..: both, in a world of 60 m
   rm -f "$folder"/*.json
   "$roborun" plant --world "$root/tests/data/worlds/two_pillars.toml" --port "$name" --seconds 240 --json "$@" \
     >"$folder/plant.json" 2>"$folder/plant.err" &
   plant=$!
-  "$roborun" run --vehicle paper --link "port:$name" --goal 60,0,4 --bounds -10,-15,1.5,70,15,8 --profile paper \
+  "$roborun" run --vehicle paper --link "$link" --goal 60,0,4 --bounds -10,-15,1.5,70,15,8 --profile paper \
     --best-effort --wait 60 --seconds 120 --json >"$folder/run.json" 2>"$folder/run.err" &
   run=$!
 }
@@ -32,6 +33,21 @@ reaches_the_goal() {
   start
   ends 0 $run && ends 0 $plant && is True run reached_goal && is landed run ended && is True plant reached_goal &&
     is False plant collided && is landed plant reason && is 0 run heap_calls_after_start
+}
+# The same with everything but cameras and lines on one DroneCAN bus, where an operator proves the kill switch and arms.
+flies_over_the_bus() {
+  local link="dronecan:port:$name"
+  start --bus-sensors
+  ends 0 $run && ends 0 $plant && is True run reached_goal && is landed run ended && is True plant reached_goal &&
+    is False plant collided && is landed plant reason && is 0 run heap_calls_after_start
+}
+# Its IMU, receiver, barometer, ESCs and battery die together.
+switches_off_without_a_bus() {
+  local link="dronecan:port:$name"
+  start --bus-sensors
+  flown 12
+  kill -KILL $plant
+  ends 1 $run && is terminated run reason && is "motors off" run ended && is False run reached_goal
 }
 lands_on_a_signal() {
   start
@@ -99,7 +115,7 @@ lands_without_a_feeder() {
 }
 
 failed=0
-for flight in reaches_the_goal lands_on_a_signal switches_off_without_a_plant switches_off_when_the_plant_stops \
+for flight in reaches_the_goal flies_over_the_bus switches_off_without_a_bus lands_on_a_signal switches_off_without_a_plant switches_off_when_the_plant_stops \
   falls_without_a_runtime plant_ends_on_a_signal goes_on_with_a_new_feeder lands_without_a_feeder; do
   tries $flight $flight || failed=$((failed + 1))
 done

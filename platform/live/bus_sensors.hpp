@@ -1,0 +1,120 @@
+/// The navigation sensors of a vehicle on its DroneCAN bus, as devices of the runtime: RawIMU, Fix2 with Heading,
+/// StaticPressure.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/exchange/spsc_ring.hpp"
+#include "core/geometry/vector.hpp"
+#include "core/sensor_rig.hpp"
+#include "firmware_if/barometer.hpp"
+#include "firmware_if/can.hpp"
+#include "firmware_if/dronecan/bus_time.hpp"
+#include "firmware_if/gnss.hpp"
+#include "firmware_if/imu.hpp"
+#include "platform/live/far_end.hpp"
+#include "platform/sensor_port/port_navigation.hpp"
+
+namespace roborun::live {
+
+/// Each kind of sensor is believed of one node: the first that says it. On the ground another one may follow when it has been
+/// silent; in flight none, another sensor is a jump. What cannot be is refused and counted, and the failsafe sees a sensor that
+/// is silent.
+///
+/// Stamps: the message's own, where it has one and a master keeps the bus's time; else when it came, a fix kFixAge before that.
+/// IMU: the means over the integration interval, which carry all bits; where a node does not integrate, the latest values.
+class BusSensors {
+ public:
+  /// Assumed of receivers without a shared clock: from the measurement to the bus.
+  static constexpr Nanos kFixAge{100'000'000};
+
+  /// `bus`: an end of it of its own, which outlives this. The world begins at `origin`, or at the first fix.
+  BusSensors(firmware_if::CanBus& bus, const SensorRig& rig,
+             const std::optional<sensor_port::EarthPlace>& origin);
+  BusSensors(const BusSensors&) = delete;
+  BusSensors& operator=(const BusSensors&) = delete;
+
+  /// Takes what has come: once a minor frame, before the devices are read. RT-safe: at most 128 frames, no allocation.
+  void hear(MonotonicTime now) noexcept;
+  [[nodiscard]] firmware_if::Imu& imu() noexcept { return imu_; }
+  [[nodiscard]] firmware_if::Gnss& gnss() noexcept { return gnss_; }
+  [[nodiscard]] firmware_if::Barometer& barometer() noexcept { return pressure_; }
+
+  /// As FarEnd::look(), after hear(): takes what the devices hold.
+  void look(MonotonicTime now, std::vector<Need>& needs);
+  void use(MonotonicTime now, std::vector<PortUse>& all) const;
+
+ private:
+  /// Who says one kind of message, and how it stands with that.
+  struct Voice {
+    const char* device;
+    const char* message;
+    Nanos patience;
+    std::uint8_t node{0};  ///< 0: nobody yet.
+    MonotonicTime heard = MonotonicTime::min();
+    MonotonicTime stamp = MonotonicTime::min();  ///< Of the newest sample.
+    std::uint64_t taken{0}, refused{0}, foreign{0}, silences{0};
+    const char* refusal{nullptr};  ///< Why the newest one was refused; null: it was not.
+  };
+  template <typename Interface, typename Sample>
+  class Device final : public Interface {
+   public:
+    [[nodiscard]] Status read(Sample& sample) noexcept override {
+      return ring.pop(sample) ? Status::kOk : Status::kNotReady;
+    }
+    core::SpscRing<Sample, 32> ring;
+  };
+  /// Mean of what the IMU measured, and how often, over the last whole second on the ground.
+  struct Rest {
+    MonotonicTime begin{};
+    std::uint64_t count{0};
+    Vector3 sum_B_mps2 = Vector3::Zero();
+    double rate_Hz{0.0};
+    Vector3 mean_B_mps2 = Vector3::Zero();
+    bool is_known{false};
+  };
+
+  void take(const firmware_if::dronecan::Transfer& transfer) noexcept;
+  void take(const firmware_if::dronecan::RawImu& m, MonotonicTime came) noexcept;
+  void take(const firmware_if::dronecan::GnssFix2& m, MonotonicTime came) noexcept;
+  void take(const firmware_if::dronecan::GnssHeading& m, MonotonicTime came) noexcept;
+  void take(const firmware_if::dronecan::StaticPressure& m, MonotonicTime came) noexcept;
+  /// It is of the node that is believed, and decodes.
+  template <typename T>
+  void hear_as(const firmware_if::dronecan::Transfer& transfer, Voice& voice) noexcept;
+  /// Refuses with `why`, or accepts a sample that was measured at `stamp`.
+  [[nodiscard]] static bool accept(Voice& voice, const char* why, MonotonicTime stamp) noexcept;
+  [[nodiscard]] MonotonicTime measured_at(std::uint64_t usec, MonotonicTime came,
+                                          MonotonicTime otherwise) const noexcept;
+  /// The fix that waited for the heading of its epoch.
+  void let_go() noexcept;
+  void rest(MonotonicTime now) noexcept;
+  [[nodiscard]] static Need need_of(Voice& voice, MonotonicTime now);
+
+  firmware_if::CanBus& bus_;
+  bool has_gnss_, needs_heading_;
+  std::array<firmware_if::dronecan::Reassembler::Session, 16> sessions_{};
+  firmware_if::dronecan::Reassembler reassembler_;
+  firmware_if::dronecan::BusTime time_;
+  std::optional<sensor_port::LocalFrame> frame_;
+  Voice imu_voice_{"imu", "RawIMU", Nanos{25'000'000}};
+  Voice fix_voice_{"gnss", "Fix2", Nanos{1'000'000'000}};
+  Voice heading_voice_{"heading", "ardupilot.gnss.Heading, of a receiver with two antennas,",
+                       Nanos{1'000'000'000}};
+  Voice pressure_voice_{"pressure", "StaticPressure", Nanos{500'000'000}};
+  Device<firmware_if::Imu, firmware_if::ImuSample> imu_;
+  Device<firmware_if::Gnss, firmware_if::GnssFix> gnss_;
+  Device<firmware_if::Barometer, firmware_if::BarometerSample> pressure_;
+  std::optional<firmware_if::GnssFix> waiting_;  ///< For its heading.
+  MonotonicTime waits_since_{};
+  double heading_rad_{}, sigma_heading_rad_{};  ///< Heard at heading_voice_.heard.
+  std::uint8_t satellites_{0};
+  std::optional<double> first_altitude_m_;
+  double start_m_{0.0};  ///< Height of where it stands.
+  Rest rest_;
+};
+
+}  // namespace roborun::live

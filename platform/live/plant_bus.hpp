@@ -1,0 +1,58 @@
+/// The plant's sensors as nodes on its DroneCAN bus, and its operator before the flight.
+#pragma once
+
+#include "firmware_if/barometer.hpp"
+#include "firmware_if/can.hpp"
+#include "firmware_if/gnss.hpp"
+#include "firmware_if/imu.hpp"
+#include "platform/sensor_port/port_navigation.hpp"
+#include "platform/sitl/bus/fake_node.hpp"
+
+namespace roborun::live {
+
+/// An IMU, which also keeps the bus's time, a receiver with two antennas, and a barometer. One thread.
+class SensorNodes {
+ public:
+  /// `bus` outlives this. The world's origin is at `origin`.
+  SensorNodes(firmware_if::CanBus& bus, const sensor_port::EarthPlace& origin);
+  /// Once a minor frame, before the samples. `ahead`: how far the bus's time is ahead of the world's, which may have stood
+  /// still.
+  void step(MonotonicTime now, Nanos ahead) noexcept;
+  void say(const firmware_if::ImuSample& sample) noexcept;
+  void say(const firmware_if::GnssFix& fix) noexcept;
+  void say(const firmware_if::BarometerSample& sample) noexcept;
+
+ private:
+  [[nodiscard]] firmware_if::dronecan::Timestamp stamp_of(MonotonicTime stamp) const noexcept;
+
+  sitl::FakeVoice<firmware_if::dronecan::GlobalTimeSync> time_;
+  sitl::FakeVoice<firmware_if::dronecan::RawImu> imu_;
+  sitl::FakeVoice<firmware_if::dronecan::GnssFix2> fix_;
+  sitl::FakeVoice<firmware_if::dronecan::GnssHeading> heading_;
+  sitl::FakeVoice<firmware_if::dronecan::StaticPressure> pressure_;
+  sitl::FakeVoice<firmware_if::dronecan::StaticTemperature> temperature_;
+  sitl::FakeHeartbeat imu_beat_, receiver_beat_, barometer_beat_;
+  sensor_port::LocalFrame frame_;
+  double origin_height_m_;
+  MonotonicTime now_{}, measured_{};
+  Nanos ahead_{};
+  std::uint64_t told_usec_{0};
+};
+
+/// Once somebody speaks on the bus he shows that the kill switch works: presses it, and releases it. Then he switches the
+/// arming switch off and on again, until it flies.
+class PlantOperator {
+ public:
+  /// `now`: as time passes; `heard`: the runtime spoke since the last call.
+  void step(MonotonicTime now, bool heard) noexcept;
+  void flies() noexcept { flies_ = true; }
+  [[nodiscard]] bool presses_kill() const noexcept;
+  [[nodiscard]] bool arms() const noexcept;
+
+ private:
+  double time_s_{-1.0};  ///< Since the runtime was first heard; negative: it was not.
+  MonotonicTime began_{}, heard_{};
+  bool hears_{false}, flies_{false};
+};
+
+}  // namespace roborun::live
