@@ -316,7 +316,8 @@ void add_port_command(CLI::App& app, std::function<int()>& run) {
   list_app->add_flag("--json", options->json, "One object per port: port, device, written_to, reason");
   list_app->callback([options, &run] { run = [options] { return list_ports(options->json); }; });
 
-  CLI::App* watch_app = port_app->add_subcommand("watch", "Rate, age and content of one port, once per second");
+  CLI::App* watch_app =
+      port_app->add_subcommand("watch", "Rate, age and content of one port, once per second");
   watch_app->add_option("port", options->name, "NAME, or a file")->required();
   add_number(*watch_app, "--seconds", options->watch_s, 0.1, 1e9,
              "Stop after this many seconds; default: at Ctrl-C (exit code 130)")
