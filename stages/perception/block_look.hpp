@@ -269,9 +269,22 @@ HWY_INLINE void aim(const SightCamera& c, float half_m, const Lanes& at, Look& l
 struct InHoles {
   unsigned in_part{0}, sparse{0}, dark{0};
 };
-/// Of a cell half of the pixels are enough, at the second look; nearly all at the first. A larger block must be seen all over:
-/// what it hides may be large, too.
-HWY_INLINE InHoles in_holes(const Look& look, bool are_cells, unsigned blocks) {
+/// How much of a block's image may be in holes, in kHoleShares-ths of its pixels: at one look, and at each of two.
+struct HoleShare {
+  std::int32_t once{0}, twice{0};
+};
+constexpr std::int32_t kHoleShares = 1024;  // times the pixels of the largest image: 31 bits
+static_assert(kHoleShares * std::int64_t{kMaxImageSide} * kMaxImageSide < (std::int64_t{1} << 31U));
+/// So large may be what a block hides, whatever its size: an eighth of the face of a cell of 0.3 m at one look, half of it at each
+/// of two; of a smaller block the same shares of its own face. A block that is divided further must be seen all over.
+HWY_INLINE HoleShare hole_share(const PrecisionLattice& lattice, int level, int finest) {
+  if (level > finest) return {};
+  const double ratio = std::min(kPublishedCell_m / lattice.cell_size_m(level), 1.0);
+  const auto share = [ratio](std::int32_t most) { return static_cast<std::int32_t>(most * (ratio * ratio)); };
+  return {share(kHoleShares / 8), share(kHoleShares / 2)};
+}
+
+HWY_INLINE InHoles in_holes(const Look& look, HoleShare share, unsigned blocks) {
   InHoles result;
   if (blocks == 0) return result;
   const Ints di;
@@ -300,13 +313,14 @@ HWY_INLINE InHoles in_holes(const Look& look, bool are_cells, unsigned blocks) {
     const auto pixels = hn::Mul(side(x0, x1, sums.width), side(y0, y1, sums.height));
     const auto lost = hn::Sub(pixels, seen);
     const auto bits = [](auto is) { return bits_of(hn::RebindMask(Floats(), is)); };
-    const unsigned few =
-        bits(are_cells ? hn::Gt(hn::ShiftLeft<3>(lost), pixels) : hn::Gt(lost, hn::Zero(di)));
+    const auto more_than = [&](std::int32_t of_all) {
+      return bits(hn::Gt(hn::Mul(lost, set(kHoleShares)), hn::Mul(pixels, set(of_all))));
+    };
+    const unsigned few = more_than(share.once), too_few = more_than(share.twice);
     const unsigned none = bits(hn::Eq(seen, hn::Zero(di)));
-    const unsigned half = are_cells ? ~bits(hn::Gt(lost, seen)) : 0U;
     result.dark |= (few & none) << i;
-    result.in_part |= (few & half & ~none) << i;
-    result.sparse |= (few & ~half & ~none) << i;
+    result.in_part |= (few & ~too_few & ~none) << i;
+    result.sparse |= (few & too_few & ~none) << i;
   }
   result.dark &= blocks;
   result.in_part &= blocks;
@@ -316,7 +330,7 @@ HWY_INLINE InHoles in_holes(const Look& look, bool are_cells, unsigned blocks) {
 
 /// Adds to `marks` what this camera says of the eight blocks: it sees past all of a block, or nothing of it, or
 /// something in between; or too few of its pixels say anything.
-HWY_INLINE void look_through(const Look& look, bool are_cells, Marks<unsigned>& marks) {
+HWY_INLINE void look_through(const Look& look, HoleShare share, Marks<unsigned>& marks) {
   const Floats d;
   const Ints di;
   unsigned sees_past = 0, hidden = 0;
@@ -332,7 +346,7 @@ HWY_INLINE void look_through(const Look& look, bool are_cells, Marks<unsigned>& 
   hidden &= looked & ~sees_past;
   unsigned mixed = looked & ~sees_past & ~hidden;
   if (look.pyramid->has_holes()) {
-    const InHoles holes = in_holes(look, are_cells, sees_past | mixed);
+    const InHoles holes = in_holes(look, share, sees_past | mixed);
     const unsigned unseen = (holes.sparse & sees_past) | holes.dark;
     sees_past &= ~unseen;
     mixed &= ~holes.dark;

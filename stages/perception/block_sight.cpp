@@ -142,7 +142,7 @@ void see_blocks_lanes(const SightCameras& cameras, int level, std::span<const Ve
       Look look;
       aim<false>(c, half_m, eight, look);
       Marks<unsigned> here;
-      look_through(look, false, here);
+      look_through(look, {}, here);
       const auto spread = [&](unsigned bits, std::uint64_t& to) {
         for (; bits != 0; bits &= bits - 1)
           to |= std::uint64_t{1} << in_view[first + static_cast<std::size_t>(__builtin_ctz(bits))];
@@ -167,8 +167,9 @@ EightSeen see_children_lanes(const SightCameras& cameras, const SightBlock& pare
   const std::size_t count = aim_at_children(cameras, node, sight.data());
   Marks<unsigned> marks;
   EightSeen seen{};
+  const HoleShare share = hole_share(cameras.lattice, parent.level - 1, 0);
   for (std::size_t j = 0; j < count; ++j) {
-    look_through(sight[j].look, parent.level == 1, marks);
+    look_through(sight[j].look, share, marks);
     for (unsigned i = 0; i < 8; ++i)
       seen.cameras[i] = static_cast<std::uint8_t>(seen.cameras[i] | (~(sight[j].look.outside >> i) & 1U)
                                                                         << sight[j].camera);
@@ -203,9 +204,10 @@ void see_brick_lanes(const SightCameras& cameras, const SightBlock& brick, int f
       ++nodes;
     }
     seen.visited += static_cast<std::uint32_t>(nodes);
+    const HoleShare share = hole_share(cameras.lattice, level, finest);
     for (std::size_t n = 0; n < nodes; ++n) {
       Marks<unsigned> marks;
-      for (std::size_t j = first[n]; j < first[n + 1]; ++j) look_through(sight[j].look, level == 0, marks);
+      for (std::size_t j = first[n]; j < first[n + 1]; ++j) look_through(sight[j].look, share, marks);
       const Decision<unsigned> decision = decide(marks, cameras.complete);
       seen.group[seen.count] = {static_cast<std::uint16_t>(morton[n]), static_cast<std::uint8_t>(level),
                                 static_cast<std::uint8_t>(decision.free),

@@ -38,7 +38,7 @@ struct FreeGroup {
   std::uint16_t parent;
   std::uint8_t level;
   std::uint8_t free;
-  std::uint8_t in_part;  ///< Of these, cells of which many pixels were in a hole.
+  std::uint8_t in_part;  ///< Of these, blocks of which many pixels were in a hole.
 };
 /// Room for a group of each block of level 4 .. 1; there are those of divided ones with a free child, in any
 /// order.

@@ -23,11 +23,12 @@ class NoisyImages : public ::testing::Test {
     scene_.solid = {{Vector3(-30, -30, -1), Vector3(30, 30, 0)}, {Vector3(8, -2, 0), Vector3(12, 2, 12)}};
   }
   /// With an empty map.
-  void begin() {
+  void begin(double finest_m = kPublishedCell_m) {
     arena_.~Arena();
     new (&arena_) core::Arena(block_);
     BrickMap::Config config;
     config.bounds_W = {Vector3(-30, -30, -3), Vector3(30, 30, 12)};
+    config.lattice.finest_m = finest_m;
     config.max_bricks = 2000;
     config.max_image_width = config.max_image_height = kPixels;
     sut_ = std::make_unique<BrickMap>(config, arena_);
@@ -118,6 +119,29 @@ TEST_F(NoisyImages, HolesDoNotClearWhatWasSeen) {
       for (std::size_t i = 0; i < image.size() / 2; ++i) image[i] = kNan;
     });
   EXPECT_EQ(count(front, CellState::kOccupied), before);
+}
+
+/// A block of 0.4 m right ahead is 12 x 12 pixels: 10 of them may be in a hole at one look, 40 at each of two.
+TEST_F(NoisyImages, WhatALookDoesNotDivideMayHideAsMuchAsACellOf30cm) {
+  constexpr int kBlocks = 2;  // the level of 0.4 m
+  const Aabb block{Vector3(1.25, 0.05, 4.85), Vector3(1.56, 0.36, 5.16)};
+  const auto free_after = [&](std::size_t side, int looks, int level) {
+    begin(0.1);
+    for (int n = 0; n < looks; ++n)
+      see(
+          [&](auto& image) {
+            if (&image != scene_.image.data()) return;
+            for (std::size_t v = 32 - side / 2; v < 32 - side / 2 + side; ++v)
+              for (std::size_t u = 32 - side / 2; u < 32 - side / 2 + side; ++u)
+                image[v * kPixels + u] = kNan;
+          },
+          {0.0, 0.0}, level);
+    return count(block, CellState::kFree) == 8;  // its corners, 0.3 m apart
+  };
+  EXPECT_TRUE(free_after(3, 1, kBlocks)) << "5 pixels: its corners count as their neighbours";
+  EXPECT_FALSE(free_after(6, 1, kBlocks)) << "32";
+  EXPECT_TRUE(free_after(6, 2, kBlocks));
+  EXPECT_FALSE(free_after(9, 10, kBlocks)) << "77";
 }
 
 /// What a product makes of sky: no value.
