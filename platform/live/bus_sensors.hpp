@@ -110,7 +110,6 @@ class BusSensors {
   Device<firmware_if::Barometer, firmware_if::BarometerSample> pressure_;
   std::optional<firmware_if::GnssFix> waiting_;  ///< For its heading.
   MonotonicTime waits_since_{};
-  double heading_rad_{}, sigma_heading_rad_{};  ///< Heard at heading_voice_.heard.
   std::uint8_t satellites_{0};
   std::optional<double> first_altitude_m_;
   double start_m_{0.0};  ///< Height of where it stands.

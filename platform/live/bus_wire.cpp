@@ -17,7 +17,7 @@ class KernelWire final : public BusWire {
   [[nodiscard]] std::string open() override {
     for (Socket& socket : sockets_) {
       if (!socket.is_open) {
-        const std::string wrong = socket.bus.open(interface_, epoch_);
+        std::string wrong = socket.bus.open(interface_, epoch_);
         if (!wrong.empty()) return wrong;
         socket.is_open = true;
       } else if (socket.bus.state() == firmware_if::CanState::kDetached &&
