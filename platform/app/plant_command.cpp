@@ -26,6 +26,8 @@ struct PlantOptions {
   std::string autopilot{"none"};
   std::string mavlink{"udpout://127.0.0.1:14540"};
   std::string key;
+  std::string physics{"none"};
+  int physics_port{0};
   double pilot_s{0.0};
   double seconds{0.0};
   bool no_pictures{false};
@@ -44,21 +46,41 @@ std::string far_end_of(const mavlink::LinkAddress& link) {
   return "URL";
 }
 
-/// What flies in this world.
-std::string run_line(const PlantOptions& options, const sitl::World& world, const live::PlantConfig& config) {
+/// How the autopilot is started that steps this world; empty: none does.
+std::string physics_line(const live::PlantConfig& config) {
+  if (!config.physics) return {};
+  if (config.physics->kind == mission::AutopilotKind::kPx4)
+    return fmt::format("roborun: waits for PX4's simulator link on TCP {}\n", config.physics->port);
+  return fmt::format(
+      "roborun: waits on UDP {} for: arducopter --model JSON:127.0.0.1 --home {:.8f},{:.8f},{:g},90\n",
+      config.physics->port, config.origin.latitude_deg, config.origin.longitude_deg, config.origin.height_m);
+}
+
+/// Where `run` finds the vehicle.
+std::string link_to(const PlantOptions& options, const live::PlantConfig& config) {
   std::string link = "port:" + options.common.port;
   if (config.on_bus)
     link = (options.can.empty() ? "dronecan:" + link : "dronecan:INTERFACE --port " + options.common.port) +
            " --wait 60";
   if (config.autopilot)
-    link = fmt::format("{} --autopilot {} --arm --port {}", far_end_of(config.autopilot->link),
-                       options.autopilot, options.common.port);
+    link = fmt::format("{} --autopilot {}", far_end_of(config.autopilot->link), options.autopilot);
+  if (config.physics)
+    link = fmt::format("{} --autopilot {}",
+                       config.physics->kind == mission::AutopilotKind::kPx4 ? "udpin://127.0.0.1:14540"
+                                                                            : "tcp://127.0.0.1:5760",
+                       options.physics);
+  return config.autopilot || config.physics ? link + " --arm --port " + options.common.port : link;
+}
+
+/// What flies in this world.
+std::string run_line(const PlantOptions& options, const sitl::World& world, const live::PlantConfig& config) {
+  const std::string link = link_to(options, config);
   std::string line =
       fmt::format("roborun run --vehicle {} --link {} --goal {} --bounds={},{}", options.common.vehicle, link,
                   text_of(world.goal_W()), text_of(world.bounds_W().min_W), text_of(world.bounds_W().max_W));
   if (world.start_W().z() != world.goal_W().z()) line += fmt::format(" --cruise {:g}", world.start_W().z());
   // The runtime's world begins where the vehicle stands, or with the autopilot's frame.
-  if (!config.autopilot && mission::ground_below(world).norm() > 0.01)
+  if (!config.autopilot && !config.physics && mission::ground_below(world).norm() > 0.01)
     line += fmt::format(" --origin {:.8f},{:.8f},{:g}", config.origin.latitude_deg,
                         config.origin.longitude_deg, config.origin.height_m);
   return line;
@@ -85,6 +107,12 @@ void print(const live::PlantReport& r, bool json) {
                         {"releases", r.autopilot->releases},
                         {"lost_frames", r.autopilot->lost_frames},
                         {"doubled_frames", r.autopilot->doubled_frames}};
+    if (r.physics)
+      j["physics"] = {{"steps", r.physics->steps},
+                      {"lost", r.physics->lost},
+                      {"resent", r.physics->resent},
+                      {"restarts", r.physics->restarts},
+                      {"refused", r.physics->refused}};
     fmt::print("{}\n", j.dump());
     return;
   }
@@ -92,7 +120,13 @@ void print(const live::PlantReport& r, bool json) {
              r.reached_goal ? "was at the goal" : "was not at the goal",
              r.least_clearance_m ? fmt::format(", least clearance {:.2f} m", *r.least_clearance_m) : "");
   fmt::print("{} pictures sent, {} {} heard, {} faults of its own\n", r.frames_sent, r.commands,
-             r.autopilot ? "set-points" : "bus frames", r.faults);
+             r.autopilot ? "set-points"
+             : r.physics ? "steps"
+                         : "bus frames",
+             r.faults);
+  if (r.physics)
+    fmt::print("autopilot: {} packets lost, {} resent, {} refused, {} restarts\n", r.physics->lost,
+               r.physics->resent, r.physics->refused, r.physics->restarts);
   if (r.autopilot)
     fmt::print("autopilot: mode {}, {}, {:.1f} m/s, {} time-outs\n", r.autopilot->mode,
                r.autopilot->armed ? "armed" : "disarmed", r.speed_mps, r.autopilot->timeouts);
@@ -111,6 +145,20 @@ std::optional<live::PlantAutopilot> autopilot_of(const PlantOptions& options) {
   return autopilot;
 }
 
+std::optional<live::PlantPhysics> physics_of(const PlantOptions& options) {
+  const auto kind = mission::autopilot_of("--physics", options.physics);
+  if (!kind) {
+    if (options.physics_port > 0)
+      throw InputError("--physics-port: must go with --physics px4 or arducopter");
+    return std::nullopt;
+  }
+  if (options.autopilot != "none")
+    throw InputError("--physics: must go without --autopilot: one of them flies");
+  if (options.physics_port > 0) return live::PlantPhysics{*kind, options.physics_port};
+  return live::PlantPhysics{*kind,
+                            *kind == mission::AutopilotKind::kPx4 ? live::kPx4Port : live::kArduPilotPort};
+}
+
 int plant(const PlantOptions& options) {
   live::PlantConfig config;
   config.mission = plant_mission(options.common);
@@ -119,9 +167,10 @@ int plant(const PlantOptions& options) {
   if (const auto origin = origin_of(options.origin)) config.origin = *origin;
   config.autopilot = autopilot_of(options);
   if (options.bus_sensors || !options.can.empty()) {
-    if (config.autopilot) throw InputError("--bus-sensors, --can: go without --autopilot");
+    if (config.autopilot || !options.physics.empty()) throw InputError("--bus-sensors, --can: go without --autopilot and --physics");
     config.on_bus = {options.can};
   }
+  config.physics = physics_of(options);
   if (options.seconds > 0.0) config.seconds = options.seconds;
   const sitl::World world = plant_world(options.common, config.mission);
   const input::StopOnSignal stop;
@@ -130,7 +179,7 @@ int plant(const PlantOptions& options) {
   const live::PlantReport result = live::run_plant(
       world, config,
       [&] {
-        fmt::print(stderr, "roborun: plant {} runs: {}\n", options.common.port,
+        fmt::print(stderr, "{}roborun: plant {} runs: {}\n", physics_line(config), options.common.port,
                    run_line(options, world, config));
       },
       [&](const live::PlantProgress& p) {
@@ -179,6 +228,13 @@ void add_plant_command(CLI::App& app, std::function<int()>& run) {
       ->capture_default_str();
   command->add_option("--signing-key", options->key,
                       "File with 64 hexadecimal digits: that autopilot signs, and hears nothing unsigned");
+  command
+      ->add_option("--physics", options->physics,
+                   "px4 or arducopter: a real one flies the vehicle, over its simulator link, and steps the "
+                   "world; none: none does")
+      ->capture_default_str();
+  add_whole(*command, "--physics-port", options->physics_port, 1, 65535, "Port of that link on this machine")
+      ->default_str("arducopter: UDP 9002; px4: TCP 4560");
   add_number(*command, "--pilot-after", options->pilot_s, 0.1, 86400.0,
              "After this many seconds in the air the autopilot's pilot takes over and lands")
       ->default_str("never");

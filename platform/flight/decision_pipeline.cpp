@@ -281,23 +281,23 @@ void DecisionPipeline::fit(core::StageBudget& budget, double radius_m, double sp
   request.path_W = {kept_W_.begin(), kept_W_.size()};
   request.start = draft_.start;
   request.start_time = draft_.takes_over;
-  request.limits = limits(speed_mps);
   request.radius_m = radius_m;
   meter_.charge_to(core::StageId::kSmoother);
   stages::SmoothResult smoothed;
-  constexpr int kSlower = 3;
-  constexpr double kRatio = 0.7;
-  for (int round = 0; round <= kSlower; ++round) {
+  // Of the speed: in small steps first, for in the open a little less is enough, and what is too slow is made up for by the next
+  // plan, which is too fast again.
+  constexpr std::array<double, 7> kShares{1.0, 0.92, 0.85, 0.7, 0.6, 0.49, 0.34};
+  for (const double share : kShares) {
+    request.limits = limits(share * speed_mps);
     RestOfBudget rest(budget, draft_.smoother_work);
     const Status status = smoother_.smooth(request, permitted.view(), rest, smoothed);
     draft_.smoother_work.units += smoothed.work.units;
-    if (round == 0 || status == Status::kOk) out.smoother_status = status;
+    if (share == 1.0 || status == Status::kOk) out.smoother_status = status;
     if (status != Status::kOk) return;
     draft_.trajectory = smoothed.trajectory;
     if (!config_.stops_straight ||
         stops_free(draft_.trajectory, stages::FinestView(permitted.view()), draft_.smoother_work))
       return;
-    request.limits = limits(speed_mps *= kRatio);
   }
 }
 

@@ -61,7 +61,7 @@ const char* Ground::place(const mav::GoalRequest& request, Vector3& goal_W) cons
   if (request.kind == Kind::kWorld) return nullptr;
   if (!origin_) return "nobody knows where its world begins: --origin";
   const bool over_sea = request.kind == Kind::kOverSea;
-  const double height_m = over_sea ? p[2] - origin_->height_m : p[2];
+  const double height_m = over_sea ? p[2] - origin_->height_m : stands_m_ + p[2];
   const auto local_m = sensor_port::LocalFrame(*origin_).to_local_m({p[0], p[1], origin_->height_m});
   goal_W = {local_m[0], local_m[1], height_m};
   return nullptr;

@@ -35,6 +35,8 @@ class Ground {
 
   /// Where the world begins; none: places on the earth are refused.
   void begins_at(const std::optional<sensor_port::EarthPlace>& origin) { origin_ = origin; }
+  /// Height in the world of the ground that it stands on: heights over the take-off begin there.
+  void stands_at(double height_m) { stands_m_ = height_m; }
   /// About twenty times a second: a goal that is asked for, in the world. To be answered before the next call.
   [[nodiscard]] std::optional<Vector3> step(MonotonicTime now);
   /// Null: the goal is flown to. Else why not.
@@ -63,6 +65,7 @@ class Ground {
   std::uint8_t seq_{0};
   std::uint16_t text_id_{0};
   std::optional<sensor_port::EarthPlace> origin_;
+  double stands_m_{0.0};
   firmware_if::mavlink::GoalRequest request_{};
   bool through_autopilot_{false};
   Vector3 goal_W_ = Vector3::Zero();

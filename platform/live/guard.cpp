@@ -5,6 +5,8 @@
 #include <limits>
 #include <thread>
 
+#include "firmware_if/mavlink/flight_messages.hpp"
+#include "firmware_if/mavlink/ned.hpp"
 #include "firmware_if/mavlink/receiver.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/live/obstacle_sectors.hpp"
@@ -19,6 +21,21 @@ using namespace firmware_if::mavlink;  // NOLINT(google-build-using-namespace): 
 constexpr std::uint8_t kObstacleAvoidance = 196;  // MAV_COMP_ID
 constexpr Nanos kPeriod{100'000'000};
 constexpr Nanos kBeat{1'000'000'000};
+constexpr Nanos kOldAttitude{500'000'000};
+
+/// FRD in NED, rad.
+struct Attitude {
+  static constexpr MessageType kType = kAttitude;
+  std::uint32_t time_boot_ms{};
+  float roll{}, pitch{}, yaw{}, rollspeed{}, pitchspeed{}, yawspeed{};
+  static constexpr std::tuple kMembers{Member<&Attitude::time_boot_ms>{"time_boot_ms"},
+                                       Member<&Attitude::roll>{"roll"},
+                                       Member<&Attitude::pitch>{"pitch"},
+                                       Member<&Attitude::yaw>{"yaw"},
+                                       Member<&Attitude::rollspeed>{"rollspeed"},
+                                       Member<&Attitude::pitchspeed>{"pitchspeed"},
+                                       Member<&Attitude::yawspeed>{"yawspeed"}};
+};
 
 class Guard {
  public:
@@ -49,7 +66,7 @@ class Guard {
       hear(now);
       if (now >= due) {
         due = std::max(due + kPeriod, now);
-        see();
+        see(now);
         send(sectors_.message(now), now, report);
         const double nearest_m = sectors_.nearest_m(now);
         report.nearest_m = std::min(report.nearest_m, nearest_m);
@@ -71,14 +88,17 @@ class Guard {
   }
 
  private:
-  void see() {
+  void see(MonotonicTime now) {
+    const bool leans = now - leans_at_ <= kOldAttitude;
+    const Matrix3 R_LB = leans ? R_LB_ : Matrix3(Matrix3::Identity());
     firmware_if::DepthFrame frame;
     for (std::size_t i = 0; i < pictures_.cameras().size(); ++i)
       if (pictures_.cameras()[i]->read(frame) == Status::kOk)
-        sectors_.see(i, frame, pictures_.cameras()[i]->mount());
+        sectors_.see(i, frame, pictures_.cameras()[i]->mount(), R_LB);
   }
 
-  /// The system that is guarded is that of the first autopilot; its clock's questions are answered.
+  /// The system that is guarded is that of the first autopilot. Its clock's questions are answered, and what it says of its
+  /// attitude without being asked is believed.
   void hear(MonotonicTime now) {
     constexpr int kMost = 64;
     std::size_t count = 0;
@@ -99,11 +119,27 @@ class Guard {
     if (frame.header.compid != kAutopilot) return;
     if (frame.msgid == kHeartbeat.id && sysid_ == 0 && unpack<Heartbeat>(frame.payload).autopilot != kInvalid)
       sysid_ = frame.header.sysid;
-    if (frame.msgid != kTimesync.id || frame.header.sysid != sysid_) return;
+    if (frame.header.sysid != sysid_) return;
+    if (frame.msgid == kAttitude.id) {
+      const auto m = unpack<Attitude>(frame.payload);
+      lean(now, level_of(static_cast<double>(m.roll), static_cast<double>(m.pitch)));
+    }
+    if (frame.msgid == kAttitudeQuaternion.id) {
+      const auto m = unpack<AttitudeQuaternion>(frame.payload);
+      const auto v = wide(m.q2, m.q3, m.q4);
+      lean(now, level_of(std::array{static_cast<double>(m.q1), v[0], v[1], v[2]}));
+    }
+    if (frame.msgid != kTimesync.id) return;
     const auto question = unpack<Timesync>(frame.payload);
     GuardReport none;
     if (question.tc1 == 0)
       send(Timesync{now.time_since_epoch().count(), question.ts1, sysid_, kAutopilot}, now, none);
+  }
+
+  void lean(MonotonicTime now, const Matrix3& R_LB) {
+    if (!R_LB.allFinite()) return;
+    R_LB_ = R_LB;
+    leans_at_ = now;
   }
 
   template <typename T>
@@ -126,6 +162,8 @@ class Guard {
   std::array<std::uint8_t, 4096> bytes_{};
   std::uint8_t seq_{0}, sysid_{0};
   std::uint64_t messages_{0};
+  Matrix3 R_LB_ = Matrix3::Identity();
+  MonotonicTime leans_at_{-2 * kOldAttitude};
 };
 
 }  // namespace

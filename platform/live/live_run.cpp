@@ -216,12 +216,15 @@ void LiveRun::tell_ground() {
 }
 
 void LiveRun::listen_to_ground() {
+  if (!seen_.flying.load(std::memory_order_relaxed) && end_.reason().empty())
+    ground_.stands_at(end_.p_W().z());
   const auto goal_W = ground_.step(clock_.now());
   if (!goal_W) return;
   if (!end_.reason().empty()) return ground_.answer("it lands");
   if (system_.decision_program().give_goals({&*goal_W, 1}) != Status::kOk)
     return ground_.answer("outside of the bounds or the fence");
   follows_route_ = false;
+  cap_mps_.store(std::numeric_limits<double>::infinity(), std::memory_order_relaxed);  // it was the mission's
   end_.set_goal(*goal_W, true);
   ground_.answer(nullptr);
 }

@@ -13,9 +13,9 @@ namespace {
 constexpr double kLevel = 0.05;  // rise over run
 constexpr float kNone_m = std::numeric_limits<float>::infinity();
 
-/// Of a direction in the body frame (FLU).
-std::size_t sector_of(const Vector3& v_B) {
-  const double clockwise_deg = -core::atan2(v_B.y(), v_B.x()) / core::kDegree;
+/// Of a direction, level (FLU).
+std::size_t sector_of(const Vector3& v_L) {
+  const double clockwise_deg = -core::atan2(v_L.y(), v_L.x()) / core::kDegree;
   const auto nearest = static_cast<int>(std::lround(clockwise_deg / 5.0));
   constexpr int kCount = ObstacleSectors::kSectors;
   return static_cast<std::size_t>((nearest % kCount + kCount) % kCount);
@@ -23,35 +23,50 @@ std::size_t sector_of(const Vector3& v_B) {
 
 }  // namespace
 
+Matrix3 level_of(double roll_rad, double pitch_rad) {
+  const core::SinCos r = core::sin_cos(roll_rad),
+                     p = core::sin_cos(-pitch_rad);  // about forward, and about left
+  Matrix3 R_LB;
+  R_LB << p.cos, p.sin * r.sin, p.sin * r.cos, 0.0, r.cos, -r.sin, -p.sin, p.cos * r.sin, p.cos * r.cos;
+  return R_LB;
+}
+
+Matrix3 level_of(const std::array<double, 4>& q) {
+  const auto [w, x, y, z] = q;
+  return level_of(core::atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+                  core::asin(std::clamp(2.0 * (w * y - z * x), -1.0, 1.0)));
+}
+
 void ObstacleSectors::see(std::size_t camera, const firmware_if::DepthFrame& f,
-                          const firmware_if::CameraMount& mount) {
+                          const firmware_if::CameraMount& mount, const Matrix3& R_LB) {
   Camera& c = camera_.at(camera);
   c.stamp = f.stamp;
   c.range_min_m = static_cast<double>(f.range_min_m);
   c.range_m = static_cast<double>(f.range_m);
   c.sector.fill({kNone_m, false, false});
-  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R_BC(mount.R_BC.data());
-  const Vector3 p_BC(mount.p_BC_m[0], mount.p_BC_m[1], mount.p_BC_m[2]);
+  const Matrix3 R_LC =
+      R_LB * Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(mount.R_BC.data());
+  const Vector3 p_LC = R_LB * Vector3(mount.p_BC_m[0], mount.p_BC_m[1], mount.p_BC_m[2]);
   for (std::size_t v = 0; v < f.height; ++v)
     for (std::size_t u = 0; u < f.width; ++u) {
       const auto across = [](std::size_t i, std::uint16_t count, float tangent) {
         return -(2.0 * (static_cast<double>(i) + 0.5) / count - 1.0) * static_cast<double>(tangent);
       };
-      const Vector3 ray_B =
-          R_BC * Vector3(1.0, across(u, f.width, f.tan_half_width), across(v, f.height, f.tan_half_height));
+      const Vector3 ray_L =
+          R_LC * Vector3(1.0, across(u, f.width, f.tan_half_width), across(v, f.height, f.tan_half_height));
       const auto depth_m = static_cast<double>(f.depth_m[v * f.width + u]);
       const bool silent = !(depth_m > c.range_min_m);  // also NaN
       const bool empty = depth_m > c.range_m;
       if (silent || empty) {
-        if (std::fabs(ray_B.z()) > kLevel * core::hypot2(ray_B.x(), ray_B.y())) continue;
-        Sector& sector = c.sector.at(sector_of(ray_B));
+        if (std::fabs(ray_L.z()) > kLevel * core::hypot2(ray_L.x(), ray_L.y())) continue;
+        Sector& sector = c.sector.at(sector_of(ray_L));
         (silent ? sector.silent : sector.free) = true;
         continue;
       }
-      const Vector3 hit_B = p_BC + depth_m * ray_B;
-      if (std::fabs(hit_B.z()) > band_m_) continue;
-      Sector& sector = c.sector.at(sector_of(hit_B));
-      sector.hit_m = std::min(sector.hit_m, static_cast<float>(core::hypot2(hit_B.x(), hit_B.y())));
+      const Vector3 hit_L = p_LC + depth_m * ray_L;
+      if (std::fabs(hit_L.z()) > band_m_) continue;
+      Sector& sector = c.sector.at(sector_of(hit_L));
+      sector.hit_m = std::min(sector.hit_m, static_cast<float>(core::hypot2(hit_L.x(), hit_L.y())));
     }
 }
 

@@ -5,13 +5,18 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/geometry/vector.hpp"
 #include "firmware_if/depth_camera.hpp"
 #include "firmware_if/mavlink/flight_messages.hpp"
 
 namespace roborun::live {
 
+/// From the body (FLU) to the same heading, level, of MAVLink's angles (FRD, rad), and of its attitude (FRD in NED; w, x, y, z).
+[[nodiscard]] Matrix3 level_of(double roll_rad, double pitch_rad);
+[[nodiscard]] Matrix3 level_of(const std::array<double, 4>& q);
+
 /// 72 sectors of 5 degrees, clockwise; the middle of the first one is straight ahead. What lies within `band_m` above or below the
-/// body's middle counts, in the body's own axes (a vehicle that leans sees the ground as an obstacle). A sector holds the nearest
+/// body's middle counts. A sector holds the nearest
 /// hit; it is free only if a level ray (3 degrees) of it found nothing within the range and none of them said nothing; else
 /// it is not known.
 class ObstacleSectors {
@@ -21,8 +26,10 @@ class ObstacleSectors {
   static constexpr Nanos kOld{500'000'000};  ///< An image; then what it showed is not known.
 
   ObstacleSectors(std::size_t cameras, double band_m) : camera_(cameras), band_m_(band_m) {}
-  /// The newest image of a camera.
-  void see(std::size_t camera, const firmware_if::DepthFrame& frame, const firmware_if::CameraMount& mount);
+  /// The newest image of a camera. `R_LB`: from the body to the same heading, level; identity where nobody knows how it leans: then
+  /// the band is that of the body's axes, and a vehicle that leans sees the ground as an obstacle.
+  void see(std::size_t camera, const firmware_if::DepthFrame& frame, const firmware_if::CameraMount& mount,
+           const Matrix3& R_LB = Matrix3::Identity());
   /// As it is to be sent at `now`; ranges are the least far of the cameras. Body frame (12), right for PX4 and ArduPilot.
   [[nodiscard]] firmware_if::mavlink::ObstacleDistance message(MonotonicTime now) const;
   /// The nearest hit at `now`, m; +infinity: none.

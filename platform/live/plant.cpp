@@ -87,8 +87,13 @@ class Plant {
   PlantReport run(const std::function<void(const PlantProgress&)>& progress);
 
  private:
-  /// One minor frame of the world.
+  /// One minor frame of the world, when it is due.
+  void keep_pace();
   void step(MonotonicTime now);
+  /// The same as a real autopilot steps it; less where it is silent.
+  void follow();
+  /// The world's clock beside ours: behind it by what we were late, and never ahead of it.
+  void keep_time(MonotonicTime now);
   void judge();
   void judge_collision(const sitl::VehicleState& s);
   void wait_until(MonotonicTime due) const;
@@ -103,8 +108,9 @@ class Plant {
   TruthPort truth_;
   sitl::SimulatedAircraft aircraft_;
   sitl::SimulatedPlant& plant_{aircraft_.plant()};
-  std::unique_ptr<PlantSide> side_;
-  Nanos held_{0};  ///< So much later is it than in the world, which stood still.
+  std::unique_ptr<PhysicsLink> physics_;  ///< Null: this machine's clock steps the world.
+  std::unique_ptr<PlantSide> side_;       ///< Null: there is physics_.
+  Nanos held_{0};                         ///< So much later is it than in the world, which stood still.
   MonotonicTime start_{}, listened_{}, heard_{};
   std::optional<MonotonicTime> first_word_;
   std::uint64_t frame_{0}, stalls_{0};
@@ -125,10 +131,13 @@ Plant::Plant(const sitl::World& world, const PlantConfig& config)
       truth_(names_),
       aircraft_(flight_.vehicle, config.mission.simulator, mission::ground_below(world), config.mission.seed,
                 flight_.minor_frame, pictures_),
-      side_(config.autopilot ? autopilot_side(aircraft_, flight_.vehicle, flight_.minor_frame,
-                                              *config.autopilot, config.origin)
-                             : port_side(aircraft_, sitl::rig_of(config.mission.simulator), names_,
-                                         config.origin, config.on_bus)) {
+      physics_(config.physics ? physics_link(*config.physics, config.origin) : nullptr),
+      side_(config.physics ? nullptr
+            : config.autopilot
+                ? autopilot_side(aircraft_, flight_.vehicle, flight_.minor_frame, *config.autopilot,
+                                 config.origin)
+                : port_side(aircraft_, sitl::rig_of(config.mission.simulator), names_, config.origin,
+                            config.on_bus)) {
   plant_.stand_in(world);
 }
 
@@ -143,6 +152,50 @@ void Plant::step(MonotonicTime now) {
   const Nanos shift = clock_.epoch() + held_;
   side_->tell(plant_.now() + held_, shift);
   truth_.write(plant_.now(), plant_.vehicle().state().p_WB, plant_.vehicle().state().q_WB, shift);
+  judge();
+}
+
+void Plant::keep_pace() {
+  const MonotonicTime due = plant_.now() + held_ + flight_.minor_frame;
+  wait_until(due);
+  const MonotonicTime now = clock_.now();
+  if (now - due > kStoodStill) {
+    held_ += now - due;
+    report_.stood_still_s += seconds(now - due);
+    ++stalls_;
+  }
+  pictures_.set_shift(clock_.epoch() + held_);
+  step(now);
+}
+
+void Plant::keep_time(MonotonicTime now) {
+  constexpr int kSlowly = 64;  // minor frames: packets come in bursts, and the earliest tells the time
+  const Nanos late = now - plant_.now() - held_;
+  if (report_.commands > 0 && late > kStoodStill) {
+    report_.stood_still_s += seconds(late);
+    ++stalls_;
+  }
+  held_ += late > Nanos{0} && late <= kStoodStill ? late / kSlowly : late;
+  pictures_.set_shift(clock_.epoch() + held_);
+}
+
+void Plant::follow() {
+  const MonotonicTime end = plant_.now() + flight_.minor_frame;
+  for (bool is_over = false; !is_over;) {
+    const auto next = physics_->wait();
+    if (!next) return;
+    const Vector3 before_W = plant_.vehicle().state().p_WB;
+    plant_.move(next->dt, next->motors);
+    report_.distance_m += (plant_.vehicle().state().p_WB - before_W).norm();
+    is_over = plant_.now() + next->dt / 2 >= end;
+    if (is_over) plant_.look();
+    physics_->answer(plant_);
+  }
+  heard_ = clock_.now();
+  keep_time(heard_);
+  report_.commands = physics_->counters().steps;
+  truth_.write(plant_.now(), plant_.vehicle().state().p_WB, plant_.vehicle().state().q_WB,
+               clock_.epoch() + held_);
   judge();
 }
 
@@ -162,10 +215,11 @@ void Plant::judge_collision(const sitl::VehicleState& s) {
 void Plant::judge() {
   constexpr std::uint64_t kEvery = 4;  // 10 ms: 6 cm
   const sitl::VehicleState& s = plant_.vehicle().state();
-  const auto& throttle = plant_.far_side().throttle();
+  const auto& throttle = plant_.vehicle().commanded().thrust_ratio;
   const bool turns = std::any_of(throttle.begin(), throttle.end(), [](double ratio) { return ratio > 0.0; });
   left_ground_ = left_ground_ || s.p_WB.z() > plant_.vehicle().ground_m() + kOffGround_m;
-  if (left_ground_) side_->left_ground(plant_.now() + held_);
+  if (left_ground_ && side_) side_->left_ground(plant_.now() + held_);
+  if (left_ground_ && physics_ && !first_word_) first_word_ = plant_.now();
   if (left_ground_ && s.on_ground && sink_mps_ > kHardTouchdown_mps) report_.collided = true;
   sink_mps_ = s.on_ground ? 0.0 : -s.v_WB.z();
   if (turns || !s.on_ground) turning_ = plant_.now();
@@ -196,25 +250,19 @@ PlantReport Plant::run(const std::function<void(const PlantProgress&)>& progress
   heard_ = start_ - kSilent;
   plant_.start(start_);
   while (report_.reason.empty()) {
-    const MonotonicTime due = plant_.now() + held_ + flight_.minor_frame;
-    wait_until(due);
-    const MonotonicTime now = clock_.now();
-    if (now - due > kStoodStill) {
-      held_ += now - due;
-      report_.stood_still_s += seconds(now - due);
-      ++stalls_;
-    }
-    pictures_.set_shift(clock_.epoch() + held_);
-    step(now);
+    if (physics_)
+      follow();
+    else
+      keep_pace();
     ++frame_;
+    const MonotonicTime now = clock_.now();
     if (frame_ % kAskEvery == 0) {
-      if (now - listened_ >= kListenAgain && now - heard_ >= kSilent) {
+      if (side_ && now - listened_ >= kListenAgain && now - heard_ >= kSilent) {
         listened_ = now;
         side_->listen();
       }
       if (report_.reason.empty() && config_.stop && config_.stop()) report_.reason = "interrupted";
-      if (report_.reason.empty() && seconds(plant_.now() - start_) >= config_.seconds)
-        report_.reason = "time_limit";
+      if (report_.reason.empty() && seconds(now - start_) >= config_.seconds) report_.reason = "time_limit";
     }
     if (frame_ % kTellEvery == 0 && progress) {
       const sitl::VehicleState& s = plant_.vehicle().state();
@@ -227,10 +275,13 @@ PlantReport Plant::run(const std::function<void(const PlantProgress&)>& progress
   report_.reached_goal = goal_s_.has_value();
   if (left_ground_) report_.least_clearance_m = clearance_m_;
   report_.frames_sent = pictures_.sent();
-  report_.faults = stalls_ + pictures_.lost() + side_->lost();
-  report_.commands = side_->commands();
+  report_.faults = stalls_ + pictures_.lost() + (side_ ? side_->lost() : 0);
   report_.speed_mps = plant_.vehicle().state().v_WB.norm();
-  report_.autopilot = side_->autopilot();
+  if (side_) {
+    report_.commands = side_->commands();
+    report_.autopilot = side_->autopilot();
+  }
+  if (physics_) report_.physics = physics_->counters();
   return std::move(report_);
 }
 

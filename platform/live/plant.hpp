@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "platform/live/physics_link.hpp"
 #include "platform/live/plant_side.hpp"
 #include "platform/mission/mission_config.hpp"
 #include "platform/sensor_port/port_navigation.hpp"
@@ -19,6 +20,8 @@ struct PlantConfig {
   sensor_port::EarthPlace origin{47.397742, 8.545594, 488.0};  ///< Of the world's (0, 0, 0).
   std::optional<PlantAutopilot> autopilot{};                   ///< None: the runtime has sensors and motors.
   std::optional<PlantBus> on_bus{};                            ///< None: its sensors are ports.
+  std::optional<PlantPhysics>
+      physics{};  ///< A real autopilot flies it, and steps the world; without `autopilot`.
   bool pictures{
       true};  ///< False: depth images and clouds are made by another process (live::feed_pictures()).
   double seconds{std::numeric_limits<double>::infinity()};
@@ -26,7 +29,8 @@ struct PlantConfig {
 };
 
 struct PlantReport {
-  /// From the first word of the runtime on the bus to the goal, or to the end; without a word: from the start to the end.
+  /// From the first word of the runtime on the bus (under a real autopilot: from leaving the ground) to the goal, or to the end;
+  /// without it: from the start to the end.
   double time_s{};
   double distance_m{};  ///< Flown.
   bool collided{};
@@ -38,9 +42,10 @@ struct PlantReport {
   /// were lost.
   std::uint64_t faults{};
   double stood_still_s{};
-  std::uint64_t commands{};  ///< Frames heard on the bus, or set-points.
+  std::uint64_t commands{};  ///< Frames heard on the bus, set-points, or steps of a real autopilot.
   double speed_mps{};        ///< At the end.
   std::optional<PlantAutopilotReport> autopilot{};
+  std::optional<PhysicsCounters> physics{};
   /// "collision", "landed" (on the ground again, motors off), "time_limit" or "interrupted".
   std::string reason;
 };
@@ -49,7 +54,7 @@ inline constexpr double kClearanceCap_m = 10.0;
 
 struct PlantProgress {
   double time_s{};  ///< Since the start.
-  bool is_heard{};  ///< The runtime is there.
+  bool is_heard{};  ///< The runtime is there, or a real autopilot.
   Vector3 p_WB = Vector3::Zero();
   double speed_mps{};
 };

@@ -110,7 +110,7 @@ const char* MissionJudge::contact(MonotonicTime now) {
 
 const char* MissionJudge::hopeless(MonotonicTime now) {
   const flight::DecisionProgram& decisions = system_.decision_program();
-  const bool last = is_last();
+  const bool last = system_.decision_program().goals().is_last();  // of a route: any, nothing is left out
   if (seconds(now.time_since_epoch()) > config_.time_limit_s)
     return ends("time_limit", fmt::format("after {:g} s it was {:.1f} m from the goal", config_.time_limit_s,
                                           (goal_W_ - aircraft_.vehicle().state().p_WB).norm()));

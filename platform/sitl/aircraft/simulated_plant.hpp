@@ -83,6 +83,19 @@ class SimulatedPlant {
     cameras_.expose(now_, vehicle_.X_WB());
   }
 
+  /// `dt` without the bus: the motors hear at once. Nobody looks.
+  void move(Nanos dt, const firmware_if::MotorCommand& motors) noexcept {
+    (void)vehicle_.command(motors);
+    vehicle_.step(dt);
+    now_ += dt;
+  }
+  /// About once a minor frame, where it is moved: ground, sensors, cameras.
+  void look() noexcept {
+    find_ground();
+    sensors_.sample(now_, vehicle_.state());
+    cameras_.expose(now_, vehicle_.X_WB());
+  }
+
   /// IMU, receiver, barometer and odometry, as they are read.
   [[nodiscard]] FaultySensors& sensors() noexcept { return sensors_; }
   [[nodiscard]] bool has_odometry() const noexcept { return has_odometry_; }

@@ -45,6 +45,8 @@ class Vehicle final : public firmware_if::Motors {
   /// Advances by dt in substeps of at most 1.25 ms. An empty battery gives no thrust.
   void step(Nanos dt) noexcept;
   [[nodiscard]] const VehicleState& state() const noexcept { return state_; }
+  /// What its motors were told last.
+  [[nodiscard]] const firmware_if::MotorCommand& commanded() const noexcept { return command_; }
   /// Height of the surface below it, on which it can stand; 0 until then.
   void set_ground(double ground_m) noexcept { ground_m_ = ground_m; }
   [[nodiscard]] double ground_m() const noexcept { return ground_m_; }

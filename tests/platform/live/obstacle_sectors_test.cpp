@@ -15,7 +15,7 @@ constexpr std::uint16_t kFree = 2501;
 /// One camera of 90 x 73 degrees, 25 m, that looks ahead or to the right.
 class ObstacleSectorsTest : public ::testing::Test {
  protected:
-  void show(bool to_the_right) {
+  void show(bool to_the_right, const Matrix3& R_LB = Matrix3::Identity()) {
     firmware_if::DepthFrame frame;
     frame.stamp = MonotonicTime{Nanos{1'000'000'000}};
     frame.width = kWidth;
@@ -27,7 +27,7 @@ class ObstacleSectorsTest : public ::testing::Test {
     frame.depth_m = depth_m;
     firmware_if::CameraMount mount;
     if (to_the_right) mount.R_BC = {0, 1, 0, -1, 0, 0, 0, 0, 1};  // its x is the body's -y
-    sut.see(0, frame, mount);
+    sut.see(0, frame, mount, R_LB);
   }
   [[nodiscard]] std::uint16_t at(std::size_t degrees, Nanos age = Nanos{0}) const {
     return sut.message(MonotonicTime{Nanos{1'000'000'000}} + age).distances.at(degrees / 5);
@@ -79,6 +79,31 @@ TEST_F(ObstacleSectorsTest, IsSentInTheBodysFrame) {
   EXPECT_EQ(m.increment, 5);
   EXPECT_EQ(m.min_distance, 31);  // 0.3F is a little more
   EXPECT_EQ(m.max_distance, 2500);
+}
+
+TEST_F(ObstacleSectorsTest, TheGroundBelowALeaningVehicleIsNoObstacle) {
+  constexpr double kHeight_m = 2.0;
+  // MAVLink's pitch of -20 degrees: the nose is down, and 5 degrees of roll: the right side is.
+  const double roll_rad = 5.0 * M_PI / 180.0, pitch_rad = -20.0 * M_PI / 180.0;
+  const Matrix3 R_LB = level_of(roll_rad, pitch_rad);
+  EXPECT_LT((R_LB * Vector3::UnitX()).z(), -0.3) << "its nose points down";
+  EXPECT_GT((R_LB * Vector3::UnitY()).z(), 0.05) << "its left side is up";
+  // The same as a quaternion, and heading 70 degrees: that counts for nothing.
+  const Quaternion q(Eigen::AngleAxisd(1.2, Vector3::UnitZ()) *
+                     Eigen::AngleAxisd(pitch_rad, Vector3::UnitY()) *
+                     Eigen::AngleAxisd(roll_rad, Vector3::UnitX()));
+  EXPECT_LT((level_of(std::array{q.w(), q.x(), q.y(), q.z()}) - R_LB).norm(), 1e-6);
+  for (std::size_t v = 0; v < kHeight; ++v)
+    for (std::size_t u = 0; u < kWidth; ++u) {
+      const double across = 1.0 - 2.0 * (static_cast<double>(u) + 0.5) / kWidth;
+      const double up = 0.75 * (1.0 - 2.0 * (static_cast<double>(v) + 0.5) / kHeight);
+      const double fall = -(R_LB * Vector3(1.0, across, up)).z();
+      if (fall > 0.0) depth_m[v * kWidth + u] = static_cast<float>(kHeight_m / fall);
+    }
+  show(false);
+  EXPECT_LT(at(0), 600) << "in the body's axes the ground is ahead";
+  show(false, R_LB);
+  EXPECT_EQ(at(0), kFree);
 }
 
 }  // namespace

@@ -75,6 +75,9 @@ says 2 "must go without --signing-key" run --vehicle paper --link "$url" --port 
 says 2 "--guard: goes with a MAVLink --link" run --vehicle paper --link "port:$name" --guard
 says 2 "camera 1: /dev/shm/roborun-$name-camera1: No such file" run --vehicle paper --link "$url" --port "$name" --guard --wait 0
 says 2 "--pilot-after: must go with --autopilot" plant --port "$name" --pilot-after 3
+says 2 "--physics: unknown autopilot 'nix'" plant --port "$name" --physics nix
+says 2 "--physics-port: must go with --physics" plant --port "$name" --physics-port 9002
+says 2 "--physics: must go without --autopilot" plant --port "$name" --physics px4 --autopilot px4
 says 2 "--signing-key: must go with --autopilot" plant --port "$name" --signing-key nope
 says 2 "must be a file of 64 hexadecimal digits" goto 1,2,3 --link udpout://127.0.0.1:9 --signing-key /nope
 says 2 "nobody answered within 0.2 s" goto 1,2,3 --link udpout://127.0.0.1:9 --wait 0.2
