@@ -11,6 +11,7 @@
 #include <cstring>
 #include <exception>
 #include <functional>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <system_error>
@@ -26,6 +27,8 @@
 #include "platform/app/fly_command.hpp"
 #include "platform/app/goto_command.hpp"
 #include "platform/app/gpio_command.hpp"
+#include "platform/app/help_format.hpp"
+#include "platform/app/manual_command.hpp"
 #include "platform/app/map_command.hpp"
 #include "platform/app/mavlink_command.hpp"
 #include "platform/app/memory_command.hpp"
@@ -81,9 +84,12 @@ int finish(int code) {
 int run_command(int argc, char** argv) {
   CLI::App app{"roborun: a navigation runtime for drones that thinks as long as it can afford to"};
   app.name("roborun");
+  app.formatter(std::make_shared<cli::HelpFormat>(cli::help_width()));  // of all commands: they take it over
   app.require_subcommand(1);
+  const roborun::report::BuildIdentity build = roborun::report::build_identity();
   app.set_version_flag("--version",
-                       fmt::format("roborun 0.1.0, commit {}", roborun::report::build_identity().commit));
+                       fmt::format("roborun {}, commit {}\ncommitted {}, compiled by {}", build.version,
+                                   build.commit, build.commit_date, build.compiler));
   app.footer(cli::kExitCodes);
   std::function<int()> run;
   cli::add_fly_command(app, run);
@@ -108,6 +114,7 @@ int run_command(int argc, char** argv) {
   cli::add_vehicle_command(app, run);
   cli::add_config_command(app, run);
   cli::add_world_command(app, run);
+  cli::add_manual_command(app, run);
   try {
     app.parse(argc, argv);
     cli::refuse_before_subcommand(app);

@@ -451,7 +451,7 @@ void RealTimeRun::fill_identity(report::AuditReport& report, const rt::IdleLaten
   std::string real_time = report.missing.empty() ? "yes" : "no";
   for (const std::string& why : report.missing) real_time += "; " + why;
   report.identity = {
-      {"program", "roborun 0.1.0"},
+      {"program", fmt::format("roborun {}", build.version)},
       {"commit", std::string(build.commit)},
       {"program_digest", "sha256 " + report::sha256_of_file("/proc/self/exe")},
       {"compiler", std::string(build.compiler)},
