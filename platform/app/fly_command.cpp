@@ -16,13 +16,13 @@
 #include "platform/app/world_arguments.hpp"
 #include "platform/board/board_profile.hpp"
 #include "platform/board/plugin_loader.hpp"
-#include "platform/evaluation/scene.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/output_file.hpp"
 #include "platform/input/stop_signal.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/mission.hpp"
+#include "platform/mission/scene.hpp"
 #include "platform/mission/settings_file.hpp"
 #include "platform/mission/work_check.hpp"
 #include "platform/report/known_picture.hpp"
@@ -241,7 +241,7 @@ int fly(const FlyOptions& options) {
   }
   if (!options.trace.empty()) input::write_file(options.trace, report::trace_csv(reports));
   if (!options.plot.empty()) {
-    const report::Scene scene = evaluation::scene_of(*world, title, zone_m);
+    const report::Scene scene = mission::scene_of(*world, title, zone_m);
     const auto by = static_cast<report::PathColour>(colour - report::kPathColourName.begin());
     input::write_file(options.plot, known  ? report::known_svg(scene, reports)
                                     : maps ? report::maps_svg(scene, reports)

@@ -9,11 +9,11 @@
 #include <string>
 
 #include "platform/app/exit_code.hpp"
-#include "platform/evaluation/scene.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/output_file.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/flight_story.hpp"
+#include "platform/mission/scene.hpp"
 #include "platform/sitl/world/generator.hpp"
 #include "platform/sitl/world/world_file.hpp"
 
@@ -32,14 +32,14 @@ struct ReportOptions {
 mission::WorldOf world_of(const ReportOptions& options) {
   if (!options.world.empty())
     return [&options](std::optional<std::uint64_t> /*seed*/) {
-      return evaluation::scene_of(sitl::load_world(options.world, {}), "", 0.0);
+      return mission::scene_of(sitl::load_world(options.world, {}), "", 0.0);
     };
   if (options.env.empty()) return {};
   const sitl::NamedEnvironment named = sitl::environment(options.env);
   const sitl::Mission mission = sitl::mission_of(options.mission);
   return [named, mission](std::optional<std::uint64_t> seed) {
     if (!seed) throw InputError("--env: the log does not say its seed: must be a log of roborun fly");
-    return evaluation::scene_of(sitl::generate(named.knobs, mission, *seed), "", named.knobs.spread_m);
+    return mission::scene_of(sitl::generate(named.knobs, mission, *seed), "", named.knobs.spread_m);
   };
 }
 
@@ -64,7 +64,7 @@ void add_report_command(CLI::App& app, std::function<int()>& run) {
       app.add_subcommand("report", "Make one offline page of a flight log: view in space, charts, reasons");
   command->footer(
       "Example:\n"
-      "  roborun fly --log flight.mcap && roborun report flight.mcap --env 14 -o flight.html\n\n"
+      "  roborun fly --log flight.mcap && roborun report flight.mcap -o flight.html\n\n"
       "The page needs a browser of 2023 or newer, and no network. Arrow keys go from decision to decision, "
       "with shift\n"
       "10 s; a click on a chart chooses a moment. A log that was cut gives a page until the cut, and a line "
@@ -72,8 +72,9 @@ void add_report_command(CLI::App& app, std::function<int()>& run) {
       "Exit code: 0 the page was written, 2 bad input.");
   command->add_option("log", options->log, "What --log FILE.mcap wrote")->required();
   command->add_option("-o,--out", options->out, "The page [LOG with the ending .html]");
-  CLI::Option* world = command->add_option("--world", options->world,
-                                           "Draw also what truly stands there, from the flight's world file");
+  CLI::Option* world = command->add_option(
+      "--world", options->world,
+      "Draw what truly stands there, where the log does not hold it: the flight's world file");
   CLI::Option* env =
       command->add_option("--env", options->env, "The same for one of the 27 environments")->excludes(world);
   command->add_option("--mission", options->mission, "With --env: the mission that was flown")

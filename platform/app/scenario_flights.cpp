@@ -10,7 +10,6 @@
 #include <system_error>
 
 #include "platform/app/options.hpp"
-#include "platform/evaluation/scene.hpp"
 #include "platform/evaluation/sweep_store.hpp"
 #include "platform/evaluation/worker_processes.hpp"
 #include "platform/input/arguments.hpp"
@@ -18,6 +17,7 @@
 #include "platform/input/output_file.hpp"
 #include "platform/input/stop_signal.hpp"
 #include "platform/input/text_file.hpp"
+#include "platform/mission/scene.hpp"
 #include "platform/mission/verdict.hpp"
 #include "platform/report/progress_line.hpp"
 #include "platform/report/svg_plot.hpp"
@@ -45,7 +45,7 @@ std::string picture_of(const mission::Scenario& s, const report::MissionReport& 
   const std::string title = fmt::format("{}, seed {}: {}", s.name, s.config.seed,
                                         complaints.empty() ? "passed" : "failed, " + flown.result.reason);
   const double zone_m = s.world.empty() ? sitl::environment(s.environment).knobs.spread_m : 0.0;
-  return report::mission_svg(evaluation::scene_of(mission::world_of(s), title, zone_m), {&flown, 1},
+  return report::mission_svg(mission::scene_of(mission::world_of(s), title, zone_m), {&flown, 1},
                              report::PathColour::kSpeed);
 }
 

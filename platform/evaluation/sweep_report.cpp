@@ -1,11 +1,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "platform/evaluation/scene.hpp"
 #include "platform/evaluation/sweep_run.hpp"
 #include "platform/input/arguments.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
+#include "platform/mission/scene.hpp"
 #include "platform/report/evaluation_table.hpp"
 #include "platform/report/flight_record.hpp"
 #include "platform/report/suite_summary.hpp"
@@ -126,7 +126,7 @@ void write_sweep_report(const SweepStore& store) {
     const sitl::NamedEnvironment named = sitl::environment(first.env);
     const std::string title = fmt::format("Environment {} ({}), {}, seed {}, cost profile {}", named.number,
                                           named.name, plan.mission, first.seed, first.profile);
-    const report::Scene scene = scene_of(
+    const report::Scene scene = mission::scene_of(
         sitl::generate(named.knobs, sitl::mission_of(plan.mission), first.seed), title, named.knobs.spread_m);
     page.picture("A representative mission: the paths over the congestion", "representative_speed.svg",
                  report::mission_svg(scene, flights, report::PathColour::kSpeed));

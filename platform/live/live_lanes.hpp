@@ -6,7 +6,7 @@
 #include "core/executive/lane_executive.hpp"
 #include "platform/flight/flight_system.hpp"
 #include "platform/log/log_records.hpp"
-#include "platform/mission/flight_records.hpp"
+#include "platform/mission/lane_logging.hpp"
 
 namespace roborun::live {
 
@@ -32,10 +32,7 @@ class SeenFlight final : public core::LaneProgram {
   SeenFlight(flight::FlightSystem& system, flight::Aircraft& aircraft, Seen& seen)
       : system_(system), aircraft_(aircraft), seen_(seen) {}
   /// Before the lanes start. Times of the log count from `start`.
-  void log_to(log::LogSink& sink, MonotonicTime start) noexcept {
-    log_ = &sink;
-    log_start_ = next_state_ = start;
-  }
+  void log_to(log::LogSink& sink, MonotonicTime start) noexcept { log_.log_to(sink, start); }
   void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override {
     system_.flight_program().run(slot, lane);
     if (slot == core::SlotId::kPublish) see(lane.release());
@@ -54,7 +51,7 @@ class SeenFlight final : public core::LaneProgram {
       seen_.stage.store(report.stage, std::memory_order_relaxed);
       seen_.armed.store(report.armed, std::memory_order_relaxed);
     }
-    log_frame(frame);
+    log_.frame_done(system_, frame, aircraft_.autopilot() == nullptr);
     stages::EstimatedState state;
     if (control.estimator().state(state) != Status::kOk) return;
     if (control.flying()) distance_m_ += (state.p_WB - last_W_).norm();
@@ -68,22 +65,10 @@ class SeenFlight final : public core::LaneProgram {
   }
 
  private:
-  void log_frame(MonotonicTime now) noexcept {
-    if (log_ == nullptr) return;
-    const std::span<const flight::FailsafeEvent> events = system_.pilot().events();
-    for (; told_events_ < events.size(); ++told_events_)
-      log_->write(mission::failsafe_entry(events[told_events_], log_start_));
-    if (now < next_state_) return;
-    next_state_ = now + mission::kStatePeriod;
-    log_->write(mission::state_record(system_, now, log_start_, aircraft_.autopilot() == nullptr));
-  }
-
   flight::FlightSystem& system_;
   flight::Aircraft& aircraft_;
   Seen& seen_;
-  log::LogSink* log_{nullptr};
-  MonotonicTime log_start_{}, next_state_{};
-  std::size_t told_events_{0};
+  mission::LaneLog log_;
   double distance_m_{0.0};
   Vector3 last_W_ = Vector3::Zero();
 };
@@ -95,14 +80,14 @@ class SeenDecisions final : public core::LaneProgram {
       : system_(system), program_(system.decision_program()), seen_(seen) {}
   /// Before the lanes start. Times of the log count from `start`.
   void log_to(log::LogSink& sink, MonotonicTime start, const PrecisionLattice& lattice) noexcept {
-    log_ = &sink;
-    log_start_ = next_slice_ = start;
-    lattice_ = lattice;
+    log_.log_to(sink, start, lattice);
   }
   void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override {
     program_.run(slot, lane);
     if (slot == core::SlotId::kGather || slot == core::SlotId::kHandOver) see();
-    if (log_ != nullptr && slot == core::SlotId::kHandOver) log_decision(lane.release());
+    if (slot == core::SlotId::kHandOver)
+      log_.handed_over(system_, lane.release(), {seen_.x_m.load(), seen_.y_m.load(), seen_.z_m.load()},
+                       seen_.speed_mps.load());
   }
   void see() noexcept {
     seen_.decisions.store(program_.decisions(), std::memory_order_relaxed);
@@ -111,29 +96,10 @@ class SeenDecisions final : public core::LaneProgram {
   }
 
  private:
-  void log_decision(MonotonicTime now) noexcept {
-    if (program_.decisions() == told_) return;
-    told_ = program_.decisions();
-    log::DecisionEntry entry =
-        mission::decision_entry(system_, program_.output(), lattice_, told_, now, log_start_);
-    entry.p_WB = {seen_.x_m.load(), seen_.y_m.load(), seen_.z_m.load()};
-    entry.speed_mps = seen_.speed_mps.load();
-    log_->write(entry);
-    if (now < next_slice_) return;
-    next_slice_ = now + mission::kSlicePeriod;
-    slice_.time_ns = entry.time_ns;
-    mission::fill_slice(system_.map().view(), {entry.p_WB[0], entry.p_WB[1], entry.p_WB[2]}, slice_);
-    log_->write(slice_);
-  }
-
   flight::FlightSystem& system_;
   flight::DecisionProgram& program_;
   Seen& seen_;
-  log::LogSink* log_{nullptr};
-  MonotonicTime log_start_{}, next_slice_{};
-  PrecisionLattice lattice_{};
-  std::uint64_t told_{0};
-  log::MapSlice slice_;
+  mission::DecisionLog log_;
 };
 
 /// Nothing is rendered here.

@@ -285,6 +285,7 @@ void LiveRun::send_zeros() {
 void LiveRun::begin_log() {
   if (config_.log.empty()) return;
   log_ = std::make_unique<log::FlightLog>(config_.log, true);
+  if (config_.viewer != nullptr) log_->show_to(*config_.viewer);
   mission::RecordedFlight flown;
   flown.flight = config_.flight;
   flown.sensors = config_.rig;

@@ -16,6 +16,7 @@
 #include "platform/live/ground.hpp"
 #include "platform/live/link.hpp"
 #include "platform/live/mission_route.hpp"
+#include "platform/log/log_viewer.hpp"
 #include "platform/sensor_port/port_navigation.hpp"
 
 namespace roborun::live {
@@ -35,6 +36,7 @@ struct LiveConfig {
   double seconds{3600.0};                                ///< Then it lands where it is.
   double wait_s{5.0};                                    ///< For what is missing at the start.
   std::string log{};             ///< File for the log of the flight; empty: none. It does not replay.
+  log::LogViewer* viewer{};      ///< Of that log; may be null, outlives the flight.
   bool best_effort{false};       ///< As rt::LaneSetConfig.
   std::function<bool()> stop{};  ///< Asked twenty times a second: true: it lands where it is. May be empty.
 };

@@ -134,6 +134,7 @@ FlightLog::FlightLog(const std::string& path, bool synced)
     return writer_.add_channel(writer_.add_schema(schema, "jsonschema", text), topic, "json");
   };
   configuration_ = channel("/configuration", "roborun.Configuration", object_schema("roborun.Configuration"));
+  world_ = channel("/world", "roborun.World", object_schema("roborun.World"));
   state_ = channel("/state", "roborun.State", state_schema());
   pose_ = channel("/pose", "foxglove.PoseInFrame", pose_schema());
   tf_ = channel("/tf", "foxglove.FrameTransforms", transforms_schema());
@@ -149,6 +150,12 @@ FlightLog::FlightLog(const std::string& path, bool synced)
   path_step_ = kStatesPerPoint;
 }
 
+void FlightLog::show_to(LogViewer& viewer) {
+  for (const Channel& channel : writer_.channels())
+    if (channel.schema_id != 0) viewer.add(channel, writer_.schemas()[channel.schema_id - 1U]);
+  viewer_ = &viewer;
+}
+
 void FlightLog::configure(const std::string& json, const StringMap& build) {
   writer_.add_metadata({"build", build});
   writer_.add_metadata({"configuration", {{"json", json}}});
@@ -158,6 +165,7 @@ void FlightLog::configure(const std::string& json, const StringMap& build) {
 void FlightLog::put(std::uint16_t channel, std::int64_t time_ns, std::string_view data) {
   last_ns_ = std::max(last_ns_, time_ns);
   writer_.message(channel, static_cast<std::uint64_t>(std::max<std::int64_t>(time_ns, 0)), data);
+  if (viewer_ != nullptr && channel != inputs_) viewer_->show(channel, time_ns, data);
   if (writer_.dropped() != told_messages_) tell_drops();
 }
 
@@ -249,6 +257,10 @@ void FlightLog::write(const MapSlice& s) noexcept {
     j.text("data", input::to_base64({reinterpret_cast<const char*>(s.cell.data()), count}));
     put(map_, s.time_ns, j.done());
   });
+}
+
+void FlightLog::world(std::string_view json) noexcept {
+  guarded(drops_.states, [&] { put(world_, 0, json); });
 }
 
 void FlightLog::inputs(std::int64_t time_ns, std::string_view bytes) noexcept {

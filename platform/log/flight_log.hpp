@@ -8,6 +8,7 @@
 
 #include "platform/log/log_file.hpp"
 #include "platform/log/log_records.hpp"
+#include "platform/log/log_viewer.hpp"
 #include "platform/log/mcap_writer.hpp"
 
 namespace roborun::log {
@@ -33,8 +34,12 @@ class FlightLog final : public LogSink {
   FlightLog(const FlightLog&) = delete;
   FlightLog& operator=(const FlightLog&) = delete;
 
+  /// From here on `viewer` gets all messages but inputs; it outlives this.
+  void show_to(LogViewer& viewer);
   /// To be called once, first: `json` is the message of `/configuration`, `build` its part of that name.
   void configure(const std::string& json, const StringMap& build);
+  /// `json` is the message of `/world`.
+  void world(std::string_view json) noexcept;
   void write(const StateRecord& record) noexcept override;
   void write(const FailsafeEntry& entry) noexcept override;
   void write(const DecisionEntry& entry) noexcept override;
@@ -59,8 +64,9 @@ class FlightLog final : public LogSink {
 
   LogFile file_;
   McapWriter writer_;
-  std::uint16_t configuration_{}, state_{}, pose_{}, tf_{}, path_{}, trajectory_{}, decision_{}, map_{},
-      failsafe_{}, events_{}, dropped_{}, result_{}, inputs_{};
+  LogViewer* viewer_{nullptr};
+  std::uint16_t configuration_{}, world_{}, state_{}, pose_{}, tf_{}, path_{}, trajectory_{}, decision_{},
+      map_{}, failsafe_{}, events_{}, dropped_{}, result_{}, inputs_{};
   std::int64_t last_ns_{0};
   RingDrops drops_{};
   std::uint64_t told_messages_{0};

@@ -1,7 +1,6 @@
 #include "platform/log/mcap_reader.hpp"
 
 #include <fmt/format.h>
-#include <zstd.h>
 
 #include <algorithm>
 
@@ -26,16 +25,7 @@ void check_definition(std::size_t bytes, std::size_t count) {
 
 }  // namespace
 
-struct McapReader::Decompressor {
-  ZSTD_DCtx* context{ZSTD_createDCtx()};
-  Decompressor() = default;
-  ~Decompressor() { ZSTD_freeDCtx(context); }
-  Decompressor(const Decompressor&) = delete;
-  Decompressor& operator=(const Decompressor&) = delete;
-};
-
-McapReader::McapReader(const std::string& path)
-    : path_(path), file_(path, "an MCAP file"), decompressor_(std::make_unique<Decompressor>()) {
+McapReader::McapReader(const std::string& path) : path_(path), file_(path, "an MCAP file") {
   try {
     read_start();
   } catch (const InputError& error) {
@@ -209,13 +199,7 @@ void McapReader::open_chunk() {
   const std::string_view body = get.bytes(get.number<std::uint64_t>());
   if (uncompressed > kMostChunk_bytes) throw InputError(fmt::format("a chunk of {} bytes", uncompressed));
   if (compression == "zstd") {
-    const unsigned long long said = ZSTD_getFrameContentSize(body.data(), body.size());
-    if (said != ZSTD_CONTENTSIZE_UNKNOWN && said != uncompressed)
-      throw InputError("a chunk of another size than it says");
-    chunk_.resize(static_cast<std::size_t>(uncompressed));
-    const std::size_t n =
-        ZSTD_decompressDCtx(decompressor_->context, chunk_.data(), chunk_.size(), body.data(), body.size());
-    if (ZSTD_isError(n) != 0 || n != uncompressed) throw InputError("a chunk that zstd does not read");
+    decompressor_.run(chunk_, body, static_cast<std::size_t>(uncompressed));
   } else if (compression.empty()) {
     if (body.size() != uncompressed) throw InputError("a chunk of another size than it says");
     chunk_ = body;

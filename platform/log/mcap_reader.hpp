@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "platform/input/input_file.hpp"
+#include "platform/log/compression.hpp"
 #include "platform/log/mcap_records.hpp"
 
 namespace roborun::log {
@@ -59,7 +60,6 @@ class McapReader {
   [[nodiscard]] std::uint64_t chunks() const noexcept { return chunks_; }
 
  private:
-  struct Decompressor;
   enum class Section : std::uint8_t { kData, kSummary, kEnd };
 
   void read_start();
@@ -83,7 +83,7 @@ class McapReader {
 
   std::string path_;
   input::InputFile file_;
-  std::unique_ptr<Decompressor> decompressor_;
+  Decompressor decompressor_;
   Section section_{Section::kData};
   std::uint64_t offset_{0};     ///< Read so far.
   std::uint64_t record_at_{0};  ///< Where the record at hand begins.

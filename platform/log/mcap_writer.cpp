@@ -1,7 +1,5 @@
 #include "platform/log/mcap_writer.hpp"
 
-#include <zstd.h>
-
 #include <algorithm>
 
 #include "platform/log/crc32.hpp"
@@ -9,33 +7,14 @@
 namespace roborun::log {
 namespace {
 
-constexpr int kLevel = 1;  // DECISIONS.md
-
 /// Of a message in a chunk, without its data: channel, sequence, two times.
 constexpr std::uint64_t kMessageHead_bytes = 2 + 4 + 8 + 8;
 
 }  // namespace
 
-struct McapWriter::Compressor {
-  ZSTD_CCtx* context{ZSTD_createCCtx()};
-  std::string out;
-  Compressor() = default;
-  ~Compressor() { ZSTD_freeCCtx(context); }
-  Compressor(const Compressor&) = delete;
-  Compressor& operator=(const Compressor&) = delete;
-  /// Empty if it cannot.
-  std::string_view run(std::string_view bytes) {
-    if (context == nullptr) return {};
-    out.resize(ZSTD_compressBound(bytes.size()));
-    const std::size_t n =
-        ZSTD_compressCCtx(context, out.data(), out.size(), bytes.data(), bytes.size(), kLevel);
-    return ZSTD_isError(n) != 0 ? std::string_view() : std::string_view(out).substr(0, n);
-  }
-};
-
 McapWriter::McapWriter(ByteSink& sink, std::string_view profile, std::string_view library,
                        const McapOptions& options)
-    : sink_(sink), options_(options), compressor_(std::make_unique<Compressor>()) {
+    : sink_(sink), options_(options) {
   pending_ = kMagic;
   std::string header;
   Put(header).text(profile).text(library);
@@ -114,7 +93,7 @@ void McapWriter::close_chunk() {
   chunk.first_ns = first_ns_;
   chunk.last_ns = last_ns_;
   chunk.uncompressed = records_.size();
-  std::string_view body = options_.compressed ? compressor_->run(records_) : std::string_view();
+  std::string_view body = options_.compressed ? compressor_.run(records_) : std::string_view();
   chunk.compression = body.empty() ? "" : "zstd";
   if (body.empty()) body = records_;
   chunk.compressed = body.size();

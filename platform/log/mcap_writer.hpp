@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "platform/log/compression.hpp"
 #include "platform/log/log_file.hpp"
 #include "platform/log/mcap_records.hpp"
 
@@ -46,6 +47,9 @@ class McapWriter {
   /// The summary. Nothing may follow.
   void finish();
 
+  /// What was added so far; the ids count from 1.
+  [[nodiscard]] const std::vector<Schema>& schemas() const noexcept { return schemas_; }
+  [[nodiscard]] const std::vector<Channel>& channels() const noexcept { return channels_; }
   /// Messages of chunks that could not be written; never decreases.
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
   /// Taken by the sink so far.
@@ -58,7 +62,6 @@ class McapWriter {
     std::map<std::uint16_t, std::uint64_t> index_offset;
   };
   using Index = std::map<std::uint16_t, std::vector<std::pair<std::uint64_t, std::uint64_t>>>;
-  struct Compressor;
 
   /// With what is pending before it.
   [[nodiscard]] bool flush(std::string_view bytes);
@@ -67,7 +70,7 @@ class McapWriter {
 
   ByteSink& sink_;
   McapOptions options_;
-  std::unique_ptr<Compressor> compressor_;
+  Compressor compressor_;
   std::string pending_;      ///< Before the next chunk.
   std::string definitions_;  ///< Schemas and channels that no chunk in the file holds yet.
   std::string records_;      ///< Of the open chunk.

@@ -1,69 +1,140 @@
 #include "platform/log/word_coding.hpp"
 
+#include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <cstring>
 #include <vector>
 
 #include "firmware_if/assert.hpp"
+#include "platform/input/input_error.hpp"
 
 namespace roborun::log {
 namespace {
 
-constexpr std::uint32_t kNothing = 0x7F800000U;  // +infinity
+// Of words of 32 bits, which are floats.
+constexpr std::uint64_t kNothing = 0x7F800000U;  // +infinity: what most of an image of the open air is
+constexpr std::uint64_t kInvalid = 0x7FC00000U;  // the usual NaN: a lost pixel
+/// Widths 0 to 64 are of differences.
+constexpr std::uint8_t kWidthOfNothing = 65, kWidthOfInvalid = 66;
+constexpr unsigned kMostBitsAtOnce = 32;
 
-/// Small differences of either sign become small numbers; 0 is left for kNothing.
-constexpr std::uint32_t symbol_of(std::uint32_t word, std::uint32_t before) {
-  const std::uint32_t difference = word - before;
-  return ((difference << 1U) ^ (0U - (difference >> 31U))) + 1U;
-}
-constexpr std::uint32_t word_of(std::uint32_t symbol, std::uint32_t before) {
-  const std::uint32_t folded = symbol - 1U;
-  return before + ((folded >> 1U) ^ (0U - (folded & 1U)));
-}
+/// Arithmetic on words of 16, 32 or 64 bits.
+struct Folding {
+  explicit Folding(std::size_t bytes) : shift(64 - 8 * static_cast<unsigned>(bytes)) {}
+  unsigned shift;  ///< Bits of a word of 64 bits that are not in use.
+  [[nodiscard]] std::uint64_t cut(std::uint64_t word) const { return word << shift >> shift; }
+  /// Small differences of either sign become small numbers.
+  [[nodiscard]] std::uint64_t fold(std::uint64_t difference) const {
+    const std::uint64_t high = difference << shift;
+    return cut(difference << 1U) ^ cut(0U - (high >> 63U));
+  }
+  [[nodiscard]] std::uint64_t unfold(std::uint64_t number) const {
+    return (number >> 1U) ^ cut(0U - (number & 1U));
+  }
+};
+
+/// Bits of a number below its highest one, which its width says already.
+constexpr unsigned bits_below(unsigned width) { return width > 1 ? width - 1 : 0; }
+
+class PutBits {
+ public:
+  explicit PutBits(std::string& to) : to_(to) {}
+  /// The lowest bits of a number.
+  void put(std::uint64_t number, unsigned bits) {
+    while (bits > 0) {
+      const unsigned now = std::min(bits, kMostBitsAtOnce);
+      pending_ |= (number & ((std::uint64_t{1} << now) - 1)) << used_;
+      for (used_ += now; used_ >= 8; used_ -= 8, pending_ >>= 8U) to_ += static_cast<char>(pending_);
+      number >>= now;
+      bits -= now;
+    }
+  }
+  void end() {
+    if (used_ > 0) to_ += static_cast<char>(pending_);
+  }
+
+ private:
+  std::string& to_;
+  std::uint64_t pending_{0};
+  unsigned used_{0};
+};
+
+class GetBits {
+ public:
+  explicit GetBits(std::string_view from) : from_(from) {}
+  [[nodiscard]] std::uint64_t get(unsigned bits) {
+    std::uint64_t number = 0;
+    for (unsigned done = 0; done < bits;) {
+      const unsigned now = std::min(bits - done, kMostBitsAtOnce);
+      for (; held_ < now; held_ += 8) {
+        if (taken_ == from_.size()) throw InputError("fewer bits than words");
+        pending_ |= std::uint64_t{static_cast<std::uint8_t>(from_[taken_++])} << held_;
+      }
+      number |= (pending_ & ((std::uint64_t{1} << now) - 1)) << done;
+      pending_ >>= now;
+      held_ -= now;
+      done += now;
+    }
+    return number;
+  }
+  [[nodiscard]] std::size_t taken() const { return taken_; }
+
+ private:
+  std::string_view from_;
+  std::size_t taken_{0};
+  std::uint64_t pending_{0};
+  unsigned held_{0};
+};
 
 }  // namespace
 
-void append_coded_words(std::string& to, std::string_view words, std::size_t stride) {
-  ROBORUN_ASSERT(words.size() % 4 == 0 && stride > 0);
-  const std::size_t count = words.size() / 4;
-  const std::size_t begin = to.size();
-  to.resize(begin + words.size());
-  std::vector<std::uint32_t> before(stride, 0);
-  for (std::size_t i = 0; i < count; ++i) {
-    std::uint32_t word = 0;
-    std::memcpy(&word, words.data() + 4 * i, 4);
-    std::uint32_t& last = before[i % stride];
-    std::uint32_t symbol = 0;
-    if (word != kNothing) {
-      symbol = symbol_of(word, last);
-      // Of all differences one has no symbol left; that of kNothing is free, because kNothing is 0.
-      if (symbol == 0) symbol = symbol_of(kNothing, last);
-      last = word;
+void append_coded_words(CodedWords& to, std::string_view words, const WordLayout& layout) {
+  ROBORUN_ASSERT(words.size() % layout.bytes == 0 && layout.stride > 0);
+  const Folding folding(layout.bytes);
+  std::vector<std::uint64_t> before(layout.stride, 0);
+  PutBits bits(to.bits);
+  for (std::size_t i = 0; i < words.size() / layout.bytes; ++i) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, words.data() + layout.bytes * i, layout.bytes);
+    if (layout.bytes == 4 && (word == kNothing || word == kInvalid)) {
+      to.widths += static_cast<char>(word == kNothing ? kWidthOfNothing : kWidthOfInvalid);
+      continue;
     }
-    for (std::size_t plane = 0; plane < 4; ++plane)
-      to[begin + plane * count + i] = static_cast<char>(symbol >> (8 * plane));
+    std::uint64_t& last = before[i % layout.stride];
+    const std::uint64_t number = folding.fold(folding.cut(word - last));
+    last = word;
+    const auto width = static_cast<unsigned>(std::bit_width(number));
+    to.widths += static_cast<char>(width);
+    bits.put(number, bits_below(width));
   }
+  bits.end();
 }
 
-void append_decoded_words(std::string& to, std::string_view coded, std::size_t stride) {
-  ROBORUN_ASSERT(coded.size() % 4 == 0 && stride > 0);
-  const std::size_t count = coded.size() / 4;
+void append_decoded_words(std::string& to, std::size_t count, const WordLayout& layout,
+                          std::string_view& widths, std::string_view& bits) {
+  ROBORUN_ASSERT(layout.stride > 0);
+  if (widths.size() < count) throw InputError("fewer widths than words");
+  const Folding folding(layout.bytes);
   const std::size_t begin = to.size();
-  to.resize(begin + coded.size());
-  std::vector<std::uint32_t> before(stride, 0);
+  to.resize(begin + layout.bytes * count);
+  std::vector<std::uint64_t> before(layout.stride, 0);
+  GetBits get(bits);
   for (std::size_t i = 0; i < count; ++i) {
-    std::uint32_t symbol = 0;
-    for (std::size_t plane = 0; plane < 4; ++plane)
-      symbol |= std::uint32_t{static_cast<std::uint8_t>(coded[plane * count + i])} << (8 * plane);
-    std::uint32_t& last = before[i % stride];
-    std::uint32_t word = kNothing;
-    if (symbol != 0) {
-      word = word_of(symbol, last);
-      if (word == kNothing) word = last + 0x80000000U;
-      last = word;
+    const auto width = static_cast<std::uint8_t>(widths[i]);
+    std::uint64_t word = width == kWidthOfNothing ? kNothing : kInvalid;
+    if (width <= 8 * layout.bytes) {
+      const std::uint64_t highest = width == 0 ? 0 : std::uint64_t{1} << bits_below(width);
+      std::uint64_t& last = before[i % layout.stride];
+      last = folding.cut(last + folding.unfold(highest | get.get(bits_below(width))));
+      word = last;
+    } else if (layout.bytes != 4 || width < kWidthOfNothing || width > kWidthOfInvalid) {
+      throw InputError("no width of a word");
     }
-    std::memcpy(to.data() + begin + 4 * i, &word, 4);
+    std::memcpy(to.data() + begin + layout.bytes * i, &word, layout.bytes);
   }
+  widths.remove_prefix(count);
+  bits.remove_prefix(get.taken());
 }
 
 }  // namespace roborun::log

@@ -18,7 +18,12 @@
 #include "platform/flight/flight_system.hpp"
 #include "platform/flight/watchdog_program.hpp"
 #include "platform/input/input_error.hpp"
+#include "platform/log/flight_log.hpp"
+#include "platform/log/log_thread.hpp"
 #include "platform/mission/flight_setup.hpp"
+#include "platform/mission/lane_logging.hpp"
+#include "platform/mission/recorded_flight.hpp"
+#include "platform/mission/scene.hpp"
 #include "platform/report/build_identity.hpp"
 #include "platform/report/sha256.hpp"
 #include "platform/rt/host_identity.hpp"
@@ -46,6 +51,56 @@ const char* to_string(core::OverrunPolicy policy) {
   }
   return "unknown";
 }
+
+/// Where the vehicle is by its own estimate, from lane to lane.
+struct Place {
+  std::atomic<double> x_m{0.0}, y_m{0.0}, z_m{0.0}, speed_mps{0.0};
+};
+
+/// The flight lane, and what it says to a log.
+class LoggedFlight final : public core::LaneProgram {
+ public:
+  LoggedFlight(flight::FlightSystem& system, const sitl::SimulatedAircraft& aircraft, Place& place)
+      : system_(system), aircraft_(aircraft), place_(place) {}
+  void log_to(log::LogSink& sink, MonotonicTime start) noexcept { log_.log_to(sink, start); }
+  void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override {
+    system_.flight_program().run(slot, lane);
+    if (slot != core::SlotId::kPublish) return;
+    log_.frame_done(system_, lane.release(), true, &aircraft_.vehicle().state().p_WB);
+    stages::EstimatedState state;
+    if (system_.control().estimator().state(state) != Status::kOk) return;
+    place_.x_m.store(state.p_WB.x(), std::memory_order_relaxed);
+    place_.y_m.store(state.p_WB.y(), std::memory_order_relaxed);
+    place_.z_m.store(state.p_WB.z(), std::memory_order_relaxed);
+    place_.speed_mps.store(state.v_WB.norm(), std::memory_order_relaxed);
+  }
+
+ private:
+  flight::FlightSystem& system_;
+  const sitl::SimulatedAircraft& aircraft_;
+  Place& place_;
+  LaneLog log_;
+};
+
+/// The same of the decision lane.
+class LoggedDecisions final : public core::LaneProgram {
+ public:
+  LoggedDecisions(flight::FlightSystem& system, const Place& place) : system_(system), place_(place) {}
+  void log_to(log::LogSink& sink, MonotonicTime start, const PrecisionLattice& lattice) noexcept {
+    log_.log_to(sink, start, lattice);
+  }
+  void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override {
+    system_.decision_program().run(slot, lane);
+    if (slot == core::SlotId::kHandOver)
+      log_.handed_over(system_, lane.release(), {place_.x_m.load(), place_.y_m.load(), place_.z_m.load()},
+                       place_.speed_mps.load());
+  }
+
+ private:
+  flight::FlightSystem& system_;
+  const Place& place_;
+  DecisionLog log_;
+};
 
 /// Runs the program, and in one of its slots the fault.
 class Injected final : public core::LaneProgram {
@@ -237,6 +292,8 @@ class RealTimeRun {
   [[nodiscard]] std::vector<int> lane_cpus() const;
   void start();
   void stop();
+  void begin_log();
+  void end_log(report::AuditReport& report);
   void fill_lanes(report::AuditReport& report) const;
   void fill_slots(report::AuditReport& report) const;
   void fill_commands(report::AuditReport& report) const;
@@ -244,6 +301,7 @@ class RealTimeRun {
   void fill_flight(report::AuditReport& report);
   void fill_identity(report::AuditReport& report, const rt::IdleLatencyHold& idle) const;
 
+  const sitl::World& world_;
   const RealTimeConfig& config_;
   flight::FlightConfig flight_config_;
   rt::MonotonicClock clock_;
@@ -259,6 +317,12 @@ class RealTimeRun {
   flight::WatchdogProgram watchdog_;
   std::atomic<bool> over_{false};  ///< Whatever was measured is measured.
   std::atomic<std::uint64_t> decisions_{0};
+  // Before the lanes, which write into it until they have ended.
+  std::unique_ptr<log::FlightLog> log_;  ///< Null: there is none.
+  std::unique_ptr<log::LogThread> log_thread_;
+  Place place_;
+  LoggedFlight flight_;
+  LoggedDecisions logged_decisions_;
   std::array<Injected, core::kLaneCount> program_;
   std::array<Noted, core::kLaneCount> noted_;
   rt::LaneSet lanes_;
@@ -267,7 +331,8 @@ class RealTimeRun {
 };
 
 RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
-    : config_(config),
+    : world_(world),
+      config_(config),
       flight_config_(flight_config_of(world, config.mission)),
       motor_bus_(motor_bus_of(config, clock_)),
       kill_lines_(config.kill ? std::make_unique<gpio::KernelKillLines>(*config.kill) : nullptr),
@@ -278,8 +343,9 @@ RealTimeRun::RealTimeRun(const sitl::World& world, const RealTimeConfig& config)
       setup_(flight_config_, config.mission.backends, image_limits(config.mission), config.mission.own),
       system_(flight_config_, meter_, aircraft_, cameras_.cameras(), setup_.parts(), setup_.arena(),
               cameras_.lidars()),
-      program_{Injected{system_.flight_program(), config.inject, over_},
-               Injected{system_.decision_program(), config.inject, over_},
+      flight_(system_, aircraft_, place_),
+      logged_decisions_(system_, place_),
+      program_{Injected{flight_, config.inject, over_}, Injected{logged_decisions_, config.inject, over_},
                Injected{cameras_, config.inject, over_}, Injected{watchdog_, config.inject, over_}},
       noted_{Noted{program_[0], decisions_, nullptr, &aircraft_},
              Noted{program_[1], decisions_, &system_.decision_program(), nullptr},
@@ -299,6 +365,7 @@ void RealTimeRun::start() {
   // Whole frames of simulated time from its own start, so that both clocks show the same.
   first_release_ = lanes_.choose_first_release();
   aircraft_.start(first_release_ - flight_config_.minor_frame);
+  begin_log();
   const std::string error = lanes_.start();
   if (error.empty()) return;
   stop();
@@ -315,6 +382,31 @@ std::vector<int> RealTimeRun::lane_cpus() const {
 void RealTimeRun::stop() {
   over_.store(true, std::memory_order_relaxed);  // the lanes that run must end
   lanes_.stop();
+}
+
+void RealTimeRun::begin_log() {
+  if (config_.mission.log.empty()) return;
+  log_ = std::make_unique<log::FlightLog>(config_.mission.log, true);
+  mission::begin_log(
+      *log_, recorded_flight_of(flight_config_, config_.mission, cameras_.cameras(), cameras_.lidars()),
+      "it was flown in real time, where the clock ends stages", config_.mission.profile_name,
+      world_.start_W());
+  log_->world(shapes_json(world_));
+  log_thread_ = std::make_unique<log::LogThread>(*log_);
+  flight_.log_to(*log_thread_, first_release_);
+  logged_decisions_.log_to(*log_thread_, first_release_, flight::lattice_of(flight_config_));
+}
+
+void RealTimeRun::end_log(report::AuditReport& report) {
+  if (!log_) return;
+  log_thread_->stop();
+  log_->event(static_cast<std::int64_t>(1e9 * report.seconds), log::Level::kInfo, "flight",
+              report.interrupted ? "interrupted" : "the audit ended");
+  log_->finish();
+  const log::RingDrops drops = log_thread_->drops();
+  report.identity.emplace_back("log", fmt::format("{}; {} states, {} decisions, {} slices dropped",
+                                                  log_->error().empty() ? "whole" : log_->error(),
+                                                  drops.states, drops.decisions, drops.slices));
 }
 
 void RealTimeRun::fill_lanes(report::AuditReport& report) const {
@@ -504,6 +596,7 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
   if (kill_lines_) fill_kill_switch(report);
   report.pools = setup_.pools();
   fill_identity(report, idle);
+  end_log(report);
   report.trace = std::move(evidence_).all();
   return report;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -15,8 +16,11 @@
 #include "core/executive/stage_budget.hpp"
 #include "platform/input/base64.hpp"
 #include "platform/input/json_reader.hpp"
+#include "platform/log/flight_log.hpp"
 #include "platform/log/log_records.hpp"
 #include "platform/log/mcap_reader.hpp"
+#include "platform/mission/inputs_format.hpp"
+#include "platform/mission/scene.hpp"
 
 namespace roborun::mission {
 namespace {
@@ -60,6 +64,25 @@ Json point_in(const Json& message, const std::string& key) {
   return *at;
 }
 
+/// Of `/world`. Throws InputError.
+void check_shapes(const Json& world) {
+  const auto numbers = [](const Json& list, std::size_t count) {
+    return list.is_array() && list.size() == count &&
+           std::all_of(list.begin(), list.end(), [](const Json& x) { return x.is_number(); });
+  };
+  const auto lists = [&world](const char* key, const auto& good) {
+    const auto at = world.find(key);
+    if (at == world.end() || !at->is_array() || !std::all_of(at->begin(), at->end(), good))
+      throw InputError(fmt::format("{}: must be a list of shapes", key));
+  };
+  (void)need_number(world, "height_m");
+  lists("circles", [&](const Json& circle) { return numbers(circle, 3); });
+  lists("rings", [&](const Json& ring) {
+    return ring.is_array() && !ring.empty() &&
+           std::all_of(ring.begin(), ring.end(), [&](const Json& point) { return numbers(point, 2); });
+  });
+}
+
 /// Every second element, once there are more than `most`. True if any went.
 template <typename List>
 bool thin(List& list, std::size_t most) {
@@ -78,6 +101,7 @@ class StoryTeller {
   [[nodiscard]] Json story();
   [[nodiscard]] bool empty() const { return states_.empty(); }
   [[nodiscard]] const Json& configuration() const { return configuration_; }
+  [[nodiscard]] const Json& world() const { return world_; }
 
  private:
   struct State {
@@ -92,18 +116,24 @@ class StoryTeller {
   void map(double time_s, const Json& m);
   void failsafe(double time_s, const Json& m);
   void event(double time_s, const Json& m);
+  void inputs(std::string_view message);
+  void image(std::string_view record);
+  [[nodiscard]] std::string name_of_camera(std::size_t camera) const;
   [[nodiscard]] Json facts() const;
   [[nodiscard]] Json fence() const;
 
   Json configuration_ = Json::object();
   Json result_ = Json::object();
   Json dropped_ = Json::object();
+  Json world_ = Json::object();
   std::vector<State> states_;
   double state_step_s_{kLeastStep_s};
   Json decisions_ = Json::object();
   std::vector<Json> slices_;
   double slice_step_s_{0.0};
   std::vector<Json> plans_, failsafes_, events_;
+  std::map<std::uint32_t, std::vector<Json>> images_;  ///< By camera.
+  double image_step_s_{0.0};
   std::map<std::string, double> last_s_;  ///< By topic.
   std::uint64_t out_of_order_{0};
 };
@@ -121,8 +151,10 @@ void StoryTeller::take(const log::Message& message) {
   const std::string& topic = message.channel->topic;
   const double time_s = std::round(1e-9 * static_cast<double>(message.log_ns) * kRoundedTo) / kRoundedTo;
   try {
+    if (message.channel->message_encoding == log::FlightLog::kInputsEncoding) return inputs(message.data);
     Json* whole = topic == "/configuration" ? &configuration_
                   : topic == "/result"      ? &result_
+                  : topic == "/world"       ? &world_
                   : topic == "/log/dropped" ? &dropped_
                                             : nullptr;
     const auto known = kTopics.find(topic);
@@ -130,6 +162,7 @@ void StoryTeller::take(const log::Message& message) {
     Json m = input::parse_json(message.data);
     if (!m.is_object()) throw InputError("must be a JSON object");
     if (whole != nullptr) {
+      if (whole == &world_) check_shapes(m);
       *whole = std::move(m);
       return;
     }
@@ -240,6 +273,87 @@ void StoryTeller::event(double time_s, const Json& m) {
   events_.push_back({{"time_s", time_s}, {"text", text_in(m, "message")}});
 }
 
+void StoryTeller::inputs(std::string_view message) {
+  const InputRecords inputs = records_from(message);
+  for (const InputRecord& record : inputs.records)
+    if (record.kind == RecordKind::kDepth)
+      image(std::string_view(inputs.payloads).substr(record.at, record.bytes));
+}
+
+/// The letters of page/flight_cameras.js.
+void StoryTeller::image(std::string_view record) {
+  constexpr double kNearest_m = 0.3;
+  constexpr double kLevels = 32.0;
+  std::uint32_t camera = 0;
+  firmware_if::DepthFrame frame;
+  GetField get(record);
+  get(camera);
+  each_field(get, frame);
+  const std::string_view words = get.rest();
+  const auto range_m = static_cast<double>(frame.range_m);
+  if (frame.width == 0 || words.size() != std::size_t{frame.width} * frame.height * sizeof(float) ||
+      !(range_m > kNearest_m))
+    return;  // for the flight to refuse
+  std::vector<Json>& images = images_[camera];
+  const double time_s =
+      std::round(1e-9 * static_cast<double>(frame.stamp.time_since_epoch().count()) * kRoundedTo) /
+      kRoundedTo;
+  if (!images.empty() && time_s < images.back()["time_s"].get<double>() + std::max(image_step_s_, 1e-3))
+    return;
+  const std::size_t step = (std::max(frame.width, frame.height) + kMostImagePixels - 1) / kMostImagePixels;
+  const std::size_t wide = (frame.width + step - 1) / step;
+  const std::size_t high = (frame.height + step - 1) / step;
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  std::vector<float> nearest_m(wide * high, kFar);
+  std::vector<bool> open(wide * high, false);  // a ray met nothing
+  for (std::size_t i = 0; i < words.size() / sizeof(float); ++i) {
+    float depth_m = 0.0F;
+    std::memcpy(&depth_m, words.data() + i * sizeof depth_m, sizeof depth_m);
+    const std::size_t at = i / frame.width / step * wide + i % frame.width / step;
+    if (depth_m == kFar)
+      open[at] = true;
+    else
+      nearest_m[at] = std::fmin(nearest_m[at], depth_m);  // of NaN the other one
+  }
+  std::string pixels;
+  for (std::size_t at = 0; at < nearest_m.size(); ++at) {
+    const double ratio = std::log(std::fmax(static_cast<double>(nearest_m[at]), kNearest_m) / kNearest_m) /
+                         std::log(range_m / kNearest_m);
+    pixels += nearest_m[at] == kFar
+                  ? (open[at] ? ' ' : '!')
+                  : static_cast<char>('@' + std::lround(std::fmin(ratio, 1.0) * (kLevels - 1)));
+  }
+  images.push_back({{"time_s", time_s},
+                    {"camera", camera},
+                    {"wide", wide},
+                    {"high", high},
+                    {"range_m", range_m},
+                    {"pixels", std::move(pixels)}});
+  std::size_t count = 0;
+  for (const auto& [index, list] : images_) count += list.size();
+  if (count <= kMostImages) return;
+  for (auto& [index, list] : images_) thin(list, 1);
+  image_step_s_ = std::max(2.0 * image_step_s_, 1.0);
+}
+
+/// Where it looks, if it is along an axis of the body; else empty.
+std::string StoryTeller::name_of_camera(std::size_t camera) const {
+  constexpr double kAlong = 0.8;
+  const auto mounts = object_in(configuration_, "flight").find("mounts");
+  if (mounts == object_in(configuration_, "flight").end() || !mounts->is_array() || camera >= mounts->size())
+    return {};
+  const auto turn = mounts->at(camera).find("R_BC");
+  if (turn == mounts->at(camera).end() || !turn->is_array() || turn->size() != 9) return {};
+  constexpr std::array<std::array<const char*, 2>, 3> kNames{
+      {{"front", "back"}, {"left", "right"}, {"up", "down"}}};
+  for (std::size_t axis = 0; axis < kNames.size(); ++axis) {
+    const Json& along = turn->at(3 * axis);
+    if (along.is_number() && std::abs(along.get<double>()) > kAlong)
+      return kNames.at(axis).at(along.get<double>() > 0.0 ? 0U : 1U);
+  }
+  return {};
+}
+
 /// What stands above the pictures.
 Json StoryTeller::facts() const {
   Json facts = Json::array();
@@ -325,6 +439,13 @@ Json StoryTeller::story() {
     if (number.is_number() && number.get<double>() > 0.0)
       notes.push_back(fmt::format("The log misses {:.0f} {}.", number.get<double>(), what));
   }
+  Json cameras = Json::array();
+  for (auto& [camera, list] : images_) {
+    for (Json& image : list) {
+      image["name"] = name_of_camera(camera);
+      cameras.push_back(std::move(image));
+    }
+  }
   return {{"facts", facts()},
           {"notes", std::move(notes)},
           {"bounds", low.is_null() || high.is_null() ? Json(nullptr) : Json{low, high}},
@@ -335,12 +456,13 @@ Json StoryTeller::story() {
           {"decision", std::move(decisions_)},
           {"plan", std::move(plans_)},
           {"map", std::move(slices_)},
+          {"camera", std::move(cameras)},
           {"failsafe", std::move(failsafes_)},
           {"events", std::move(events_)}};
 }
 
-/// As FlightPage's "world". Throws InputError if it is not that of the story.
-Json world_json(const Json& story, const report::Scene& scene) {
+/// Throws InputError if it is not the world of the story.
+void check_world(const Json& story, const report::Scene& scene) {
   const auto same = [](const Json& there, const Vector3& p_W, const char* what) {
     constexpr double kSame_m = 1e-3;
     if (there.is_null()) return;
@@ -356,24 +478,11 @@ Json world_json(const Json& story, const report::Scene& scene) {
   same(bounds.is_null() ? bounds : bounds[1], scene.bounds_W.max_W, "highest corner");
   same(story["start"], scene.start_W, "start");
   same(story["goal"], scene.goal_W, "goal");
-  const auto short_m = [](double x_m) { return std::round(100.0 * x_m) / 100.0; };
-  Json circles = Json::array();
-  for (const report::Scene::Circle& c : scene.circles)
-    circles.push_back({short_m(c.x_m), short_m(c.y_m), short_m(c.radius_m)});
-  Json rings = Json::array();
-  for (const report::Scene::Rect& r : scene.rects) {
-    const double x_m = short_m(r.x_m + r.width_m);
-    const double y_m = short_m(r.y_m + r.height_m);
-    rings.push_back(
-        {{short_m(r.x_m), short_m(r.y_m)}, {x_m, short_m(r.y_m)}, {x_m, y_m}, {short_m(r.x_m), y_m}});
-  }
-  for (const auto& outline : scene.outlines) rings.push_back(outline);
-  return {{"height_m", scene.start_W.z()}, {"circles", std::move(circles)}, {"rings", std::move(rings)}};
 }
 
 }  // namespace
 
-FlightStory story_of(const std::string& path, const WorldOf& world) {
+FlightStory story_of(const std::string& path, const WorldOf& world, bool live) {
   StoryTeller teller;
   log::McapReader reader(path);
   try {
@@ -393,13 +502,17 @@ FlightStory story_of(const std::string& path, const WorldOf& world) {
   told.page.footer = fmt::format("From {}. Flown by roborun, commit {}, {}.", file.filename().string(),
                                  text_in(build, "commit"), text_in(build, "compiler"));
   Json story = teller.story();
+  if (!teller.world().empty()) story["world"] = teller.world();
+  told.page.live = live;
+  if (live) story["live"] = true;
   if (!told.damage.empty()) story["notes"].push_back("The log ends early: " + told.damage);
   if (world) {
     const Json& flight = object_in(teller.configuration(), "flight");
     const auto seed = flight.find("seed");
     const bool known = seed != flight.end() && seed->is_number_unsigned();
-    story["world"] =
-        world_json(story, world(known ? std::optional(seed->get<std::uint64_t>()) : std::nullopt));
+    const report::Scene scene = world(known ? std::optional(seed->get<std::uint64_t>()) : std::nullopt);
+    check_world(story, scene);
+    story["world"] = Json::parse(shapes_json(scene));
   }
   told.page.story = story.dump(-1, ' ', false, Json::error_handler_t::replace);
   return told;

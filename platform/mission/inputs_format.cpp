@@ -1,64 +1,70 @@
 #include "platform/mission/inputs_format.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "platform/input/input_error.hpp"
 #include "platform/log/crc32.hpp"
 #include "platform/log/mcap_records.hpp"
-#include "platform/log/word_coding.hpp"
 
 namespace roborun::mission {
 namespace {
 
 constexpr std::size_t kMostRecords = 1U << 20U;
-
-struct Words {
-  std::size_t head_bytes, stride;
-};
-/// Of a kind whose size is not always the same.
-constexpr Words words_of(RecordKind kind) {
-  if (kind == RecordKind::kDepth) return {kDepthHead_bytes, 1};
-  if (kind == RecordKind::kLidar) return {kLidarHead_bytes, 3};
-  return {0, 6};  // goals: three doubles each
-}
+constexpr std::uint32_t kMostPart_bytes = 1U << 26U;
 
 constexpr const RecordSize& size_of(RecordKind kind) { return kRecordSizes[static_cast<std::size_t>(kind)]; }
 
-/// Records of one size as columns of differences.
-void append_columns(std::string& to, std::string_view payloads, std::size_t size) {
-  if (payloads.empty()) return;
-  for (std::size_t byte = 0; byte < size; ++byte) {
+/// The heads of records of one size as columns of differences.
+void append_columns(std::string& to, std::string_view payloads, const RecordSize& size) {
+  for (std::size_t byte = 0; byte < size.head; ++byte) {
     char before = 0;
-    for (std::size_t at = byte; at < payloads.size(); at += size) {
+    for (std::size_t at = byte; at < payloads.size(); at += size.most) {
       to += static_cast<char>(payloads[at] - before);
       before = payloads[at];
     }
   }
 }
 
-std::string rows_of(std::string_view columns, std::size_t size) {
-  std::string rows(columns.size(), '\0');
-  const std::size_t count = columns.size() / size;
-  for (std::size_t byte = 0; byte < size; ++byte) {
+void append_words(log::CodedWords& to, std::string_view payloads, const RecordSize& size) {
+  if (size.head == size.most) return;
+  std::string words;
+  for (std::size_t at = 0; at < payloads.size(); at += size.most)
+    words.append(payloads.substr(at + size.head, size.most - size.head));
+  log::append_coded_words(to, words, size.words);
+}
+
+/// The inverse of both.
+std::string rows_of(std::string_view columns, std::size_t count, const RecordSize& size,
+                    std::string_view& widths, std::string_view& bits) {
+  std::string rows(count * size.most, '\0');
+  for (std::size_t byte = 0; byte < size.head; ++byte) {
     char before = 0;
     for (std::size_t i = 0; i < count; ++i) {
       before = static_cast<char>(before + columns[byte * count + i]);
-      rows[i * size + byte] = before;
+      rows[i * size.most + byte] = before;
     }
   }
+  const std::size_t bytes = size.most - size.head;
+  if (bytes == 0) return rows;
+  std::string words;
+  log::append_decoded_words(words, count * bytes / size.words.bytes, size.words, widths, bits);
+  for (std::size_t i = 0; i < count; ++i)
+    rows.replace(i * size.most + size.head, bytes, words, i * bytes, bytes);
   return rows;
 }
 
 }  // namespace
 
 MotorsCheck check_of(const firmware_if::MotorCommand& command) noexcept {
-  constexpr double kMost = 65535.0;
   MotorsCheck check;
   check.crc =
       log::crc32({reinterpret_cast<const char*>(command.thrust_ratio.data()), sizeof command.thrust_ratio});
   for (std::size_t i = 0; i < check.ratio.size(); ++i) {
     const double ratio = command.thrust_ratio[i];
-    check.ratio[i] = static_cast<std::uint16_t>(ratio > 0.0 ? std::lround(std::fmin(ratio, 1.0) * kMost) : 0);
+    check.ratio[i] =
+        static_cast<std::uint16_t>(ratio > 0.0 ? std::lround(std::fmin(ratio, 1.0) * MotorsCheck::kMost) : 0);
   }
   return check;
 }
@@ -70,28 +76,47 @@ void InputBatch::add(RecordKind kind, std::string_view payload) {
     payloads_[static_cast<std::size_t>(kind)].append(payload);
     return;
   }
-  const Words words = words_of(kind);
-  log::Put(others_).number(static_cast<std::uint32_t>(payload.size()));
-  others_.append(payload.substr(0, words.head_bytes));
-  log::append_coded_words(others_, payload.substr(words.head_bytes), words.stride);
+  const RecordSize& size = size_of(kind);
+  log::Put(heads_).number(static_cast<std::uint32_t>(payload.size()));
+  heads_.append(payload.substr(0, size.head));
+  log::append_coded_words(words_, payload.substr(size.head), size.words);
 }
 
 std::string InputBatch::take() {
-  std::string message;
-  log::Put(message).text(kinds_);
+  std::string records;
+  log::CodedWords words;
+  log::Put(records).text(kinds_);
   for (std::size_t kind = 0; kind < kRecordKinds; ++kind) {
-    append_columns(message, payloads_[kind], kRecordSizes[kind].most);
+    append_columns(records, payloads_[kind], kRecordSizes[kind]);
+    append_words(words, payloads_[kind], kRecordSizes[kind]);
     payloads_[kind].clear();
   }
-  message += others_;
-  others_.clear();
+  records += heads_;
+  words.widths += words_.widths;
+  words.bits += words_.bits;
+  std::string message;
+  for (const std::string* part : {&records, &words.widths})
+    log::Put(message).number(static_cast<std::uint32_t>(part->size())).text(compressor_.run(*part));
+  message += words.bits;
   kinds_.clear();
+  heads_.clear();
+  words_ = {};
   bytes_ = 0;
   return message;
 }
 
 InputRecords records_from(std::string_view message) {
-  log::Get get(message);
+  log::Get whole(message);
+  log::Decompressor decompressor;
+  std::array<std::string, 2> part;
+  for (std::string& to : part) {
+    const auto bytes = whole.number<std::uint32_t>();
+    if (bytes > kMostPart_bytes) throw InputError(fmt::format("inputs: a part of {} bytes", bytes));
+    decompressor.run(to, whole.text(), bytes);
+  }
+  std::string_view widths = part[1];
+  std::string_view bits = whole.rest();
+  log::Get get(part[0]);
   const std::string_view kinds = get.text();
   if (kinds.size() > kMostRecords) throw InputError("inputs: too many records");
   std::array<std::size_t, kRecordKinds> count{};
@@ -103,7 +128,8 @@ InputRecords records_from(std::string_view message) {
   std::array<std::string, kRecordKinds> rows;
   for (std::size_t kind = 0; kind < kRecordKinds; ++kind) {
     const RecordSize& size = kRecordSizes[kind];
-    if (size.is_fixed() && size.most > 0) rows[kind] = rows_of(get.bytes(count[kind] * size.most), size.most);
+    if (size.is_fixed())
+      rows[kind] = rows_of(get.bytes(count[kind] * size.head), count[kind], size, widths, bits);
   }
   InputRecords inputs;
   inputs.payloads.reserve(message.size());
@@ -118,15 +144,17 @@ InputRecords records_from(std::string_view message) {
       from += size.most;
     } else {
       const auto bytes = get.number<std::uint32_t>();
-      const Words words = words_of(kind);
-      if (bytes < size.least || bytes > size.most || (bytes - words.head_bytes) % (4 * words.stride) > 0)
+      if (bytes < size.least || bytes > size.most ||
+          (bytes - size.head) % (size.words.bytes * size.words.stride) > 0)
         throw InputError("inputs: a record of another size");
-      inputs.payloads.append(get.bytes(words.head_bytes));
-      log::append_decoded_words(inputs.payloads, get.bytes(bytes - words.head_bytes), words.stride);
+      inputs.payloads.append(get.bytes(size.head));
+      log::append_decoded_words(inputs.payloads, (bytes - size.head) / size.words.bytes, size.words, widths,
+                                bits);
     }
     inputs.records.push_back({kind, at, inputs.payloads.size() - at});
   }
-  if (!get.rest().empty()) throw InputError("inputs: more bytes than records");
+  if (!get.rest().empty() || !widths.empty() || !bits.empty())
+    throw InputError("inputs: more bytes than records");
   return inputs;
 }
 

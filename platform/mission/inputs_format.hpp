@@ -1,9 +1,12 @@
 /// How the inputs of a flight, and what it did with them, stand in the messages of `/inputs`.
 ///
-/// A message holds the records of a tenth of a second, in the order in which the lanes read them: u32 count, one byte of kind
-/// each; then for each kind of one size its records as columns (byte 0 of all, byte 1 of all, ..., each byte as its difference from
-/// the one before); then the others one by one: u32 bytes, head, and words of 32 bits as byte planes (word_coding.hpp). All in the
-/// byte order of x86-64 and AArch64.
+/// A message holds the records of a tenth of a second, in the order in which the lanes read them, in three parts that have nothing
+/// in common; the first two as u32 bytes, u32 coded bytes, a frame of zstd:
+///  - u32 count, one byte of kind each; for each kind of one size the heads of its records as columns (byte 0 of all, byte 1 of all,
+///    ..., each byte as its difference from the one before); of the others one by one u32 bytes and head;
+///  - the widths of the words behind the heads (word_coding.hpp): kinds of one size first, one by one, then the others in order;
+///  - the bits of these words.
+/// All in the byte order of x86-64 and AArch64.
 #pragma once
 
 #include <array>
@@ -20,6 +23,8 @@
 #include "firmware_if/lidar.hpp"
 #include "platform/flight/aircraft.hpp"
 #include "platform/flight/goal_queue.hpp"
+#include "platform/log/compression.hpp"
+#include "platform/log/word_coding.hpp"
 
 namespace roborun::mission {
 
@@ -42,39 +47,42 @@ enum class RecordKind : std::uint8_t {
 };
 inline constexpr std::size_t kRecordKinds = 14;
 
-/// Least and most bytes of a record of each kind.
+/// Bytes of a record of each kind: least, most, and those of its head. What follows the head are words.
 struct RecordSize {
-  std::uint32_t least, most;
+  std::uint32_t least, most, head;
+  log::WordLayout words{1, 1};
   [[nodiscard]] constexpr bool is_fixed() const noexcept { return least == most; }
 };
 inline constexpr std::uint32_t kDepthHead_bytes = 4 + 8 + 4 + 2 + 2 + 4 * 4;
 inline constexpr std::uint32_t kLidarHead_bytes = 4 + 8 + 4 + 2 * 4;
+inline constexpr std::uint32_t kSampleHead_bytes = 8 + 4;  ///< Stamp, sequence.
 inline constexpr std::uint32_t kGoal_bytes = 24;
 /// Stages of a decision, and what is compared of each: see decision_values.hpp.
 inline constexpr std::size_t kDecisionValues = 27;
 inline constexpr std::array<RecordSize, kRecordKinds> kRecordSizes{
-    {{8, 8},
-     {60, 60},
-     {100, 100},
-     {20, 20},
-     {117, 117},
-     {18, 18},
-     {kDepthHead_bytes, kDepthHead_bytes + 1280 * 1280 * 4},
-     {kLidarHead_bytes, kLidarHead_bytes + 256 * 4096 * 12},
-     {kGoal_bytes, flight::GoalQueue::kMost* kGoal_bytes},
-     {0, 0},
-     {12, 12},
-     {0, 0},
-     {8 * kDecisionValues, 8 * kDecisionValues},
-     {24, 24}}};
+    {{8, 8, 8},
+     {60, 60, kSampleHead_bytes, {8, 6}},
+     {100, 100, kSampleHead_bytes, {8, 11}},
+     {20, 20, kSampleHead_bytes, {8, 1}},
+     {117, 117, kSampleHead_bytes + 1, {8, 13}},
+     {18, 18, 18},
+     {kDepthHead_bytes, kDepthHead_bytes + 1280 * 1280 * 4, kDepthHead_bytes, {4, 1}},
+     {kLidarHead_bytes, kLidarHead_bytes + 256 * 4096 * 12, kLidarHead_bytes, {4, 3}},
+     {kGoal_bytes, flight::GoalQueue::kMost* kGoal_bytes, 0, {8, 3}},
+     {0, 0, 0},
+     {12, 12, 4, {2, 4}},
+     {0, 0, 0},
+     {8 * kDecisionValues, 8 * kDecisionValues, 8 * kDecisionValues},
+     {24, 24, 24}}};
 
 struct FlightTotals {
   std::uint64_t digest{}, minor_frames{}, decisions{};
   bool operator==(const FlightTotals&) const = default;
 };
 
-/// Of a motor command: its exact bits as a CRC-32, and its ratios to 1/65535, for who reads a difference.
+/// Of a motor command: its exact bits as a CRC-32, and its ratios to 1/kMost, for who reads a difference.
 struct MotorsCheck {
+  static constexpr double kMost = 4095.0;
   std::uint32_t crc{};
   std::array<std::uint16_t, 4> ratio{};
   bool operator==(const MotorsCheck&) const = default;
@@ -208,7 +216,9 @@ class InputBatch {
  private:
   std::string kinds_;
   std::array<std::string, kRecordKinds> payloads_;  ///< Of kinds of one size: one after the other.
-  std::string others_;
+  std::string heads_;
+  log::CodedWords words_;
+  log::Compressor compressor_;
   std::size_t bytes_{0};
 };
 

@@ -21,6 +21,7 @@
 #include "platform/mission/mission_judge.hpp"
 #include "platform/mission/recorded_flight.hpp"
 #include "platform/mission/recording.hpp"
+#include "platform/mission/scene.hpp"
 #include "platform/mission/work_check.hpp"
 #include "platform/sitl/aircraft/camera_rig.hpp"
 #include "platform/sitl/autopilot/autopilot_aircraft.hpp"
@@ -263,9 +264,10 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
   aircraft_.stand_in(world);
   if (!faults_.empty()) aircraft_.connect(faults_.line());
   if (!config.flight.answers) aircraft_.ignore_kill_switch();
-  if (log_)
-    begin_log(*log_, recorded_flight_of(flight_config_, config_, cameras_, rig_.lidars()),
-              why_not_replayed(config_), config_.profile_name, world_.start_W());
+  if (!log_) return;
+  begin_log(*log_, recorded_flight_of(flight_config_, config_, cameras_, rig_.lidars()),
+            why_not_replayed(config_), config_.profile_name, world_.start_W());
+  log_->world(shapes_json(world_));
 }
 
 void MissionRun::log_frame(MonotonicTime now) {

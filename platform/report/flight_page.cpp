@@ -27,8 +27,9 @@ std::string deflated(const std::string& text) {
 }  // namespace
 
 std::string flight_page_html(const FlightPage& page) {
-  const std::array<std::pair<std::string_view, std::string>, 5> parts{
+  const std::array<std::pair<std::string_view, std::string>, 6> parts{
       {{"@TITLE@", xml_escape(page.title)},
+       {"@POLICY@", page.live ? "; connect-src 'self'" : ""},
        {"@STYLE@", kFlightPageStyle},
        {"@FOOTER@", xml_escape(page.footer)},
        {"@STORY@", input::to_base64(deflated(page.story))},

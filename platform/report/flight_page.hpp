@@ -19,11 +19,15 @@ struct FlightPage {
   ///   map [{time_s, x_m, y_m, z_m, cell_m, columns, rows, runs [value, count, ...]}] with 0 unknown, 1 free, 2 occupied,
   ///     row by row from the lowest corner,
   ///   world {height_m, circles [[x, y, radius]], rings [[[x, y], ...]]}: what stands at that height; may be missing,
+  ///   camera [{time_s, camera, name, wide, high, range_m, pixels}]: ascending for each camera (from 0); pixels as letters, row by
+  ///     row: page/flight_cameras.js,
+  ///   live: true if the page shall ask its server for what follows; may be missing,
   ///   failsafe [{time_s, action, phase, conditions [], sensor}], events [{time_s, text}].
   std::string story;
+  bool live{false};  ///< It may ask the server that it came from.
 };
 
-/// A complete HTML file: no request, no script of others. The story is compressed in it (deflate, base64).
+/// A complete HTML file: no request (but if it is live), no script of others. The story is compressed in it (deflate, base64).
 [[nodiscard]] std::string flight_page_html(const FlightPage& page);
 
 }  // namespace roborun::report

@@ -67,7 +67,9 @@ class Page {
     this.axis = new TimeAxis(...ends);
     const choose = t => this.go(t);
     this.scene = new Scene($('scene'), story);
+    this.cameras = new Cameras(story.camera);
     this.charts = charts_of(story, this.axis, choose);
+    this.choose = choose;
     Object.assign($('time'), { min: this.axis.from, max: this.axis.until });
     for (const [name, value] of story.facts) {
       const row = document.createElement('div');
@@ -81,6 +83,7 @@ class Page {
     this.repaint();
   }
   list_events() {
+    $('events').replaceChildren();
     const rows = this.story.events.map(e => [e.time_s, e.text, '']).concat(this.story.failsafe.map(f => [f.time_s, `failsafe: ${f.action}`,
       [f.phase, ...f.conditions, f.sensor].filter(Boolean).join(', ')])).sort((a, b) => a[0] - b[0]);
     this.rows = rows.map(([time, what, more]) => {
@@ -138,6 +141,21 @@ class Page {
     if (on && this.t >= this.axis.until) this.t = this.axis.from;
     if (on) requestAnimationFrame(frame);
   }
+  /** The story has become longer. Who looks at its end goes with it. */
+  grow(until_s) {
+    const at_end = this.t >= this.axis.until - 1e-6;
+    this.axis.until = Math.max(this.axis.until, until_s);
+    $('time').max = this.axis.until;
+    if (at_end) this.go(this.axis.until); else this.draw();
+  }
+  /** What is made of whole lists once more. */
+  renew() {
+    this.scene.measure();
+    $('charts').replaceChildren();
+    this.charts = charts_of(this.story, this.axis, this.choose);
+    this.list_events();
+    this.legend();
+  }
   go(t) {
     this.t = Math.min(this.axis.until, Math.max(this.axis.from, t));
     $('time').value = this.t;
@@ -158,6 +176,7 @@ class Page {
     $('doing').textContent = `at (${[s.x_m, s.y_m, s.z_m].map(v => v[now].toFixed(1)).join(', ')}) m, ${s.speed_mps[now].toFixed(1)} m/s` +
       (s.phase[now] ? `, ${s.phase[now]}` : '');
     $('why').textContent = at < 0 ? 'Nothing was decided yet.' : d.why[at] || 'The log holds no reasons.';
+    this.cameras.draw(this.t, this.theme);
     this.scene.draw(this.t, this.theme, $('follow').checked);
     for (const chart of this.charts) chart.draw(this.t, this.theme);
     const last = this.rows.findLast(r => r.time <= this.t + 1e-6);
@@ -167,6 +186,7 @@ class Page {
 
 read_story().then(story => {
   window.page = new Page(story);
+  if (story.live) follow_flight(window.page);
   document.documentElement.dataset.ready = 'yes';
 }).catch(error => {
   $('note').textContent = `This page cannot be drawn: ${error.message}. It needs a browser of 2023 or newer.`;

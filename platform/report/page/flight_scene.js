@@ -86,6 +86,13 @@ class KnownMap {
 class Scene {
   constructor(canvas, story) {
     this.canvas = canvas; this.story = story;
+    this.measure();
+    this.look_from(-0.55, 0.75);
+    this.listen();
+  }
+  /** All that follows from the story. */
+  measure() {
+    const story = this.story;
     this.map = new KnownMap(story.map);
     this.plan_times = story.plan.map(p => p.time_s);
     const s = story.state;
@@ -95,8 +102,6 @@ class Scene {
     this.low = side(Math.min); this.high = side(Math.max);
     this.ground = story.bounds ? Math.min(story.bounds[0][2], this.low[2]) : this.low[2];
     this.top_speed = Math.max(1, ...s.speed_mps);
-    this.look_from(-0.55, 0.75);
-    this.listen();
   }
   look_from(yaw, pitch) { this.yaw = yaw; this.pitch = pitch; this.centre = null; }
   fit() {

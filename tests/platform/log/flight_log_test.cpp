@@ -46,14 +46,34 @@ TEST(WordCoding, GivesBackAnyBits) {
     add(word);
   words += test::noise(3, 4 * 2000);
   for (std::uint32_t i = 0; i < 2000; ++i) add(i % 3 == 0 ? nothing : 0x41200000U + i);
-  for (const std::size_t stride : {std::size_t{1}, std::size_t{3}, std::size_t{6}}) {
-    std::string coded;
+  for (const WordLayout layout : {WordLayout{4, 1}, {4, 3}, {4, 6}, {8, 1}, {8, 5}, {2, 4}}) {
+    CodedWords coded;
+    append_coded_words(coded, words, layout);
+    append_coded_words(coded, words.substr(0, 12), {4, 1});
+    std::string_view widths = coded.widths;
+    std::string_view bits = coded.bits;
     std::string decoded;
-    append_coded_words(coded, words, stride);
-    EXPECT_EQ(coded.size(), words.size());
-    append_decoded_words(decoded, coded, stride);
-    EXPECT_EQ(decoded, words) << stride;
+    append_decoded_words(decoded, words.size() / layout.bytes, layout, widths, bits);
+    EXPECT_EQ(decoded, words) << layout.bytes << ", " << layout.stride;
+    append_decoded_words(decoded, 3, {4, 1}, widths, bits);
+    EXPECT_EQ(decoded, words + words.substr(0, 12));
+    EXPECT_TRUE(widths.empty() && bits.empty());
   }
+}
+
+TEST(WordCoding, RefusesTextsThatEndEarlyAndWidthsThatAreNone) {
+  const std::string words = test::noise(3, 4 * 20);
+  CodedWords coded;
+  append_coded_words(coded, words, {4, 1});
+  const auto decode = [](std::string_view widths, std::string_view bits) {
+    std::string to;
+    append_decoded_words(to, 20, {4, 1}, widths, bits);
+  };
+  decode(coded.widths, coded.bits);
+  EXPECT_THROW(decode(std::string_view(coded.widths).substr(1), coded.bits), InputError);
+  EXPECT_THROW(decode(coded.widths, std::string_view(coded.bits).substr(1)), InputError);
+  coded.widths[7] = 67;
+  EXPECT_THROW(decode(coded.widths, coded.bits), InputError);
 }
 
 TEST(FlightLog, HoldsTheTopicsOfItsReadme) {
@@ -61,6 +81,7 @@ TEST(FlightLog, HoldsTheTopicsOfItsReadme) {
   {
     FlightLog log(path, false);
     log.configure(R"({"replay":"a test"})", {{"commit", "0"}});
+    log.world(R"({"height_m":2})");
     StateRecord state;
     state.phase = "mission";
     state.has_motors = true;

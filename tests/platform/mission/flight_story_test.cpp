@@ -86,12 +86,38 @@ TEST(FlightStory, HoldsEveryCellOfTheMap) {
   EXPECT_GT(occupied, 50U);
 }
 
+TEST(FlightStory, HoldsTheWorldAndWhatTheCamerasSaw) {
+  const json s = story_in(sample(5.0));
+  EXPECT_EQ(s["world"], (json{{"height_m", 4.0},
+                              {"circles", {{9.0, -3.0, 1.0}}},
+                              {"rings", {{{20.0, 5.0}, {22.0, 5.0}, {22.0, 8.0}}}}}));
+  ASSERT_EQ(s["camera"].size(), 12U) << "two cameras, at 0 to 5 s";
+  for (std::size_t i = 0; i < 12; ++i) {
+    const json& image = s["camera"][i];
+    EXPECT_EQ(image["camera"], i / 6);
+    EXPECT_EQ(image["name"], i < 6 ? "front" : "right");
+    EXPECT_EQ(image["time_s"], static_cast<double>(i % 6) + (i < 6 ? 0.0 : 0.2));
+    ASSERT_EQ(image["wide"], 48);
+    ASSERT_EQ(image["high"], 48);
+    const std::string pixels = image["pixels"];
+    ASSERT_EQ(pixels.size(), 48U * 48U);
+    EXPECT_EQ(pixels[5 * 48 + 20], ' ') << "the sky";
+    // The nearest of four: 7 m (or less, the wall comes nearer) of 25 is level 22 of 31, 20 m is level 29.
+    EXPECT_NEAR(pixels[20 * 48 + 40] - '@', 29, 1);
+    EXPECT_LE(pixels[20 * 48 + 10] - '@', 22);
+    EXPECT_GE(pixels[20 * 48 + 10] - '@', 18);
+    EXPECT_NE(pixels[47 * 48 + 10], '!') << "of two rows one has values";
+  }
+}
+
 TEST(FlightStory, OfALongFlightIsThinned) {
   const json s = story_in(sample(1500.0));
   EXPECT_LE(s["state"]["time_s"].size(), kMostStates);
   EXPECT_GT(s["state"]["time_s"].size(), kMostStates / 3);
   EXPECT_LE(s["map"].size(), kMostSlices);
   EXPECT_GT(s["map"].size(), kMostSlices / 3);
+  EXPECT_LE(s["camera"].size(), kMostImages);
+  EXPECT_GT(s["camera"].size(), kMostImages / 3);
   EXPECT_EQ(s["decision"]["time_s"].size(), 2999U) << "every decision is kept";
 }
 
@@ -117,6 +143,8 @@ TEST(FlightStory, TakesTheWorldOfTheFlightAlone) {
   scene.circles.push_back({9.0, -3.0, 1.0});
   scene.rects.push_back({1.0, 2.0, 3.0, 4.0});
   scene.outlines.push_back({{0, 0}, {1, 0}, {0, 1}});
+  EXPECT_NE(story_in(path)["world"].dump().find("22.0,8.0"), std::string::npos)
+      << "its own, if no other is given";
   const WorldOf world = [&scene](std::optional<std::uint64_t> seed) {
     EXPECT_EQ(seed, 7U);
     return scene;
@@ -164,6 +192,9 @@ TEST(FlightStory, RefusesWhatIsNotAsDocumented) {
       {"/map",
        {R"({"pose":{"position":{"x":0,"y":0,"z":0}},"column_count":1e9,"row_stride":1e9,"cell_size":{"x":1}})",
         "must be those of a grid"}},
+      {"/world", {R"({"height_m":1,"circles":[[1,2]],"rings":[]})", "circles: must be a list of shapes"}},
+      {"/world", {R"({"height_m":1,"circles":[],"rings":[[[1,"a"]]]})", "rings: must be a list of shapes"}},
+      {"/world", {R"({"circles":[],"rings":[]})", "/world at 1.500 s: height_m: must be a number"}},
       {"/trajectory", {R"({"poses":[{"position":{"x":0,"y":0}}]})", "z: must be a number"}}};
   for (const auto& [topic, one] : cases) {
     try {
@@ -186,6 +217,10 @@ TEST(FlightPage, IsWholeAndOfTheTextThatWasGiven) {
   EXPECT_NE(html.find("default-src 'none'"), std::string::npos) << "no request";
   EXPECT_EQ(html.find("http"), html.find("http-equiv")) << "no address of anything";
   EXPECT_EQ(html.find("@STORY@"), std::string::npos);
+  EXPECT_EQ(html.find("connect-src"), std::string::npos);
+  report::FlightPage live{"a", "b", R"({"x":1})", true};
+  EXPECT_NE(report::flight_page_html(live).find("script-src 'unsafe-inline'; connect-src 'self'\">"),
+            std::string::npos);
   EXPECT_NE(html.find("class KnownMap"), std::string::npos);
   EXPECT_NE(html.find("prefers-color-scheme: dark"), std::string::npos);
   EXPECT_TRUE(html.ends_with("</html>\n"));

@@ -3,9 +3,12 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 
+#include "core/random/counter_rng.hpp"
 #include "platform/log/flight_log.hpp"
+#include "platform/mission/inputs_format.hpp"
 
 namespace roborun::test {
 
@@ -90,15 +93,40 @@ inline log::StateRecord sample_state(double time_s, double length_s) {
   return r;
 }
 
+/// One image of 96 x 96 noisy pixels as an input: a wall that comes nearer on the left, open sky above, a lost pixel in its lowest row.
+inline std::string sample_image(std::uint32_t camera, double time_s) {
+  constexpr std::uint16_t kPixels = 96;
+  firmware_if::DepthFrame frame{};
+  frame.stamp = MonotonicTime{Nanos{static_cast<std::int64_t>(1e9 * time_s)}};
+  frame.width = frame.height = kPixels;
+  frame.range_m = 25.0F;
+  core::CounterRng rng(7, static_cast<std::uint64_t>(1e3 * time_s) + camera);
+  std::string payload;
+  mission::PutField put(payload);
+  put(camera);
+  mission::each_field(put, frame);
+  for (int i = 0; i < kPixels * kPixels; ++i) {
+    const double depth_m = i % kPixels < 48 ? 4.0 + 3.0 * std::cos(0.2 * time_s) : 20.0;
+    float seen_m = static_cast<float>(depth_m + 0.001 * depth_m * depth_m * rng.normal());
+    if (i < kPixels * 20) seen_m = std::numeric_limits<float>::infinity();
+    if (i / kPixels == kPixels - 1) seen_m = std::numeric_limits<float>::quiet_NaN();
+    put(seen_m);
+  }
+  mission::InputBatch batch;
+  batch.add(mission::RecordKind::kDepth, payload);
+  return batch.take();
+}
+
 /// A flight of `length_s` seconds, whose failsafe lands at kSampleLand_s of it.
 inline void write_sample_log(const std::string& path, double length_s) {
   log::FlightLog log(path, false);
   log.configure(
       R"({"build":{"commit":"0123abc","compiler":"GNU"},"start_m":[0,0,4],"flight":{"design":"aware","seed":7,)"
-      R"("min_W":[-20,-30,0],"max_W":[1300,30,12],"goal_W":[40,0,4],"fence":{"areas":[)"
+      R"("mounts":[{"R_BC":[1,0,0,0,1,0,0,0,1]},{"R_BC":[0,1,0,-1,0,0,0,0,1]}],"min_W":[-20,-30,0],"max_W":[1300,30,12],"goal_W":[40,0,4],"fence":{"areas":[)"
       R"({"keep_in":true,"radius_m":0,"points":[[-18,-28],[900,-28],[900,28]]},)"
       R"({"keep_in":false,"radius_m":3,"points":[[30,20]]}]}}})",
       {{"commit", "0123abc"}});
+  log.world(R"({"height_m":4.0,"circles":[[9.0,-3.0,1.0]],"rings":[[[20.0,5.0],[22.0,5.0],[22.0,8.0]]]})");
   log.event(0, log::Level::kInfo, "goal", "goal (40.0, 0.0, 4.0) m");
   std::uint64_t decisions = 0;
   std::uint64_t slices = 0;
@@ -122,6 +150,8 @@ inline void write_sample_log(const std::string& path, double length_s) {
     if (time_s >= static_cast<double>(slices)) {
       ++slices;
       log.write(sample_slice(time_s));
+      for (const std::uint32_t camera : {0U, 1U})
+        log.inputs(static_cast<std::int64_t>(1e9 * time_s), sample_image(camera, time_s + 0.2 * camera));
     }
   }
   const auto end_ns = static_cast<std::int64_t>(1e9 * length_s);

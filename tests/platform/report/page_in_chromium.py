@@ -113,6 +113,7 @@ class Page:
 
 PICTURE = """document.getElementById('scene').toDataURL()"""
 CHARTS = """[...document.querySelectorAll('#charts canvas')].map(c => c.toDataURL()).join()"""
+CAMERAS = """[...document.querySelectorAll('#cameras canvas')].map(c => c.toDataURL()).join()"""
 WHY = """document.getElementById('why').textContent"""
 TIME = """Number(document.getElementById('time').value)"""
 failures = []
@@ -127,11 +128,12 @@ def check(what, good):
 def use(page, folder):
     check("there are decisions", page.value("page.story.decision.time_s.length") > 3)
     check("there are charts", page.value("document.querySelectorAll('#charts canvas').length") >= 4)
-    first = [page.value(e) for e in (PICTURE, CHARTS, WHY)]
+    check("there are two cameras, and the true world", page.value("document.querySelectorAll('#cameras canvas').length === 2 && page.story.world.circles.length === 1"))
+    first = [page.value(e) for e in (PICTURE, CHARTS, WHY, CAMERAS)]
     page.value("""(() => { const s = document.getElementById('time'); s.value = (Number(s.min) + Number(s.max)) / 2;
                   s.dispatchEvent(new Event('input')); })()""")
-    middle = [page.value(e) for e in (PICTURE, CHARTS, WHY)]
-    for name, a, b in zip(("the view in space", "the charts", "the reasons"), first, middle):
+    middle = [page.value(e) for e in (PICTURE, CHARTS, WHY, CAMERAS)]
+    for name, a, b in zip(("the view in space", "the charts", "the reasons", "what the cameras saw"), first, middle):
         check(f"the slider changes {name}", a != b)
     check("there are reasons", len(middle[2].splitlines()) > 3)
     before = page.value(TIME)

@@ -1,11 +1,12 @@
-#include "platform/evaluation/scene.hpp"
+#include "platform/mission/scene.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "core/geometry/math.hpp"
 
-namespace roborun::evaluation {
+namespace roborun::mission {
 namespace {
 
 using Point = std::array<double, 2>;
@@ -69,18 +70,14 @@ void add_cut(const Aabb& box, double height_m, double step_m, report::Scene& sce
   }
 }
 
-}  // namespace
-
-report::Scene scene_of(const sitl::World& world, const std::string& title, double zone_m) {
+report::Scene shapes_of(const sitl::World& world) {
   report::Scene scene;
-  scene.title = title;
   scene.bounds_W = world.bounds_W();
   scene.start_W = world.start_W();
   scene.goal_W = world.goal_W();
   for (const sitl::Pillar& p : world.pillars()) scene.circles.push_back({p.x_m, p.y_m, p.radius_m});
   for (const Aabb& b : world.boxes())
     scene.rects.push_back({b.min_W.x(), b.min_W.y(), b.size().x(), b.size().y()});
-  if (zone_m > 0.0) scene.zone_borders_m = {world.start_W().x() + zone_m, world.goal_W().x() - zone_m};
   for (const sitl::Ball& b : world.balls())
     scene.circles.push_back({b.center_W.x(), b.center_W.y(), b.radius_m});
   for (const sitl::Turned& t : world.turned()) scene.outlines.push_back(outline_of(t));
@@ -98,7 +95,16 @@ report::Scene scene_of(const sitl::World& world, const std::string& title, doubl
     add_cut(box, world.start_W().z(), step_m, scene,
             [&](const Vector3& p_W) { return world.mesh().clearance_m(p_W, reach_m) < reach_m; });
   }
-  if (!voxels.empty() || !world.mesh().empty()) return scene;
+  return scene;
+}
+
+}  // namespace
+
+report::Scene scene_of(const sitl::World& world, const std::string& title, double zone_m) {
+  report::Scene scene = shapes_of(world);
+  scene.title = title;
+  if (zone_m > 0.0) scene.zone_borders_m = {world.start_W().x() + zone_m, world.goal_W().x() - zone_m};
+  if (!world.voxels().empty() || !world.mesh().empty()) return scene;
   const Vector3 size = scene.bounds_W.size();
   scene.heat_cell_m = std::max(10.0, size.x() / 150.0);
   scene.heat_columns = static_cast<int>(size.x() / scene.heat_cell_m);
@@ -113,4 +119,28 @@ report::Scene scene_of(const sitl::World& world, const std::string& title, doubl
   return scene;
 }
 
-}  // namespace roborun::evaluation
+std::string shapes_json(const report::Scene& scene) {
+  using Json = nlohmann::ordered_json;
+  const auto short_m = [](double x_m) { return std::round(100.0 * x_m) / 100.0; };
+  Json circles = Json::array();
+  for (const report::Scene::Circle& c : scene.circles)
+    circles.push_back({short_m(c.x_m), short_m(c.y_m), short_m(c.radius_m)});
+  Json rings = Json::array();
+  for (const report::Scene::Rect& r : scene.rects) {
+    const double x_m = short_m(r.x_m + r.width_m);
+    const double y_m = short_m(r.y_m + r.height_m);
+    rings.push_back(
+        {{short_m(r.x_m), short_m(r.y_m)}, {x_m, short_m(r.y_m)}, {x_m, y_m}, {short_m(r.x_m), y_m}});
+  }
+  for (const auto& outline : scene.outlines) {
+    Json ring = Json::array();
+    for (const Point& p : outline) ring.push_back({short_m(p[0]), short_m(p[1])});
+    rings.push_back(std::move(ring));
+  }
+  return Json{{"height_m", scene.start_W.z()}, {"circles", std::move(circles)}, {"rings", std::move(rings)}}
+      .dump();
+}
+
+std::string shapes_json(const sitl::World& world) { return shapes_json(shapes_of(world)); }
+
+}  // namespace roborun::mission

@@ -1,4 +1,4 @@
-#include "platform/evaluation/scene.hpp"
+#include "platform/mission/scene.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "platform/report/svg_plot.hpp"
 
-namespace roborun::evaluation {
+namespace roborun::mission {
 namespace {
 
 sitl::WorldDescription empty() {
@@ -99,4 +99,4 @@ TEST(SceneOfAWorld, EveryOutlineIsDrawn) {
 }
 
 }  // namespace
-}  // namespace roborun::evaluation
+}  // namespace roborun::mission

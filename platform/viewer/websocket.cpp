@@ -1,0 +1,135 @@
+#include "platform/viewer/websocket.hpp"
+
+#include <array>
+#include <bit>
+
+#include "platform/input/base64.hpp"
+
+namespace roborun::viewer {
+namespace {
+
+constexpr std::size_t kKey_bytes = 4;
+
+std::uint32_t big_endian(std::string_view bytes) {
+  std::uint32_t value = 0;
+  for (const char c : bytes.substr(0, 4)) value = value << 8U | static_cast<std::uint8_t>(c);
+  return value;
+}
+
+void append_big_endian(std::string& to, std::uint64_t value, unsigned bytes) {
+  while (bytes-- > 0) to += static_cast<char>(value >> (8 * bytes));
+}
+
+using Sha1State = std::array<std::uint32_t, 5>;
+
+/// One block of 64 bytes; FIPS 180-4, 6.1.2.
+void add_block(Sha1State& state, std::string_view block) {
+  std::array<std::uint32_t, 80> w{};
+  for (std::size_t t = 0; t < 16; ++t) w[t] = big_endian(block.substr(4 * t));
+  for (std::size_t t = 16; t < w.size(); ++t)
+    w[t] = std::rotl(w[t - 3] ^ w[t - 8] ^ w[t - 14] ^ w[t - 16], 1);
+  auto [a, b, c, d, e] = state;
+  for (std::size_t t = 0; t < w.size(); ++t) {
+    const std::uint32_t mixed = t < 20              ? (b & c) ^ (~b & d)
+                                : t < 40 || t >= 60 ? b ^ c ^ d
+                                                    : (b & c) ^ (b & d) ^ (c & d);
+    constexpr std::array<std::uint32_t, 4> kRound{0x5A827999U, 0x6ED9EBA1U, 0x8F1BBCDCU, 0xCA62C1D6U};
+    const std::uint32_t next = std::rotl(a, 5) + mixed + e + kRound[t / 20] + w[t];
+    e = d;
+    d = c;
+    c = std::rotl(b, 30);
+    b = a;
+    a = next;
+  }
+  const Sha1State add{a, b, c, d, e};
+  for (std::size_t i = 0; i < add.size(); ++i) state[i] += add[i];
+}
+
+/// RFC 6455 asks for it; it protects nothing here.
+std::string sha1(std::string text) {
+  constexpr std::size_t kBlock_bytes = 64;
+  constexpr std::size_t kLength_bytes = 8;
+  const std::uint64_t bits = 8 * std::uint64_t{text.size()};
+  text += static_cast<char>(0x80);
+  while (text.size() % kBlock_bytes != kBlock_bytes - kLength_bytes) text += '\0';
+  append_big_endian(text, bits, kLength_bytes);
+  Sha1State state{0x67452301U, 0xEFCDAB89U, 0x98BADCFEU, 0x10325476U, 0xC3D2E1F0U};
+  for (std::size_t at = 0; at < text.size(); at += kBlock_bytes)
+    add_block(state, std::string_view(text).substr(at, kBlock_bytes));
+  std::string digest;
+  for (const std::uint32_t word : state) append_big_endian(digest, word, 4);
+  return digest;
+}
+
+bool is_control(Opcode opcode) { return (static_cast<unsigned>(opcode) & 0x8U) != 0; }
+
+}  // namespace
+
+std::string accept_key(std::string_view key) {
+  return input::to_base64(sha1(std::string(key) + "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"));
+}
+
+void append_frame(std::string& to, Opcode opcode, std::string_view payload) {
+  to += static_cast<char>(0x80U | static_cast<unsigned>(opcode));
+  if (payload.size() < 126) {
+    to += static_cast<char>(payload.size());
+  } else if (payload.size() < 65536) {
+    to += static_cast<char>(126);
+    append_big_endian(to, payload.size(), 2);
+  } else {
+    to += static_cast<char>(127);
+    append_big_endian(to, payload.size(), 8);
+  }
+  to.append(payload);
+}
+
+FrameReader::Status FrameReader::take(Message& frame, bool& last) {
+  const auto byte = [this](std::size_t at) { return static_cast<std::uint8_t>(bytes_[at]); };
+  if (bytes_.size() < 2) return Status::kMore;
+  const unsigned first = byte(0);
+  const unsigned second = byte(1);
+  const bool is_masked = (second & 0x80U) != 0;
+  std::size_t length = second & 0x7FU;
+  frame.opcode = static_cast<Opcode>(first & 0x0FU);
+  last = (first & 0x80U) != 0;
+  const bool is_known =
+      frame.opcode <= Opcode::kBinary || (frame.opcode >= Opcode::kClose && frame.opcode <= Opcode::kPong);
+  const bool is_whole_control = last && length <= 125;
+  if (!is_masked || !is_known || (first & 0x70U) != 0 || (is_control(frame.opcode) && !is_whole_control))
+    return Status::kBad;
+  std::size_t head = 2;
+  if (length == 127) return Status::kBad;  // more than kMostMessage_bytes
+  if (length == 126) {
+    head = 4;
+    if (bytes_.size() < head) return Status::kMore;
+    length = std::size_t{byte(2)} << 8U | byte(3);
+  }
+  if (bytes_.size() < head + kKey_bytes + length) return Status::kMore;
+  frame.payload = bytes_.substr(head + kKey_bytes, length);
+  for (std::size_t i = 0; i < length; ++i)
+    frame.payload[i] = static_cast<char>(frame.payload[i] ^ bytes_[head + i % kKey_bytes]);
+  bytes_.erase(0, head + kKey_bytes + length);
+  return Status::kMessage;
+}
+
+FrameReader::Status FrameReader::next(Message& message) {
+  while (!bad_) {
+    bool last = false;
+    const Status status = take(message, last);
+    if (status == Status::kMore) return status;
+    bad_ = status == Status::kBad ||
+           (!is_control(message.opcode) && joining_ != (message.opcode == Opcode::kContinue));
+    if (bad_) break;
+    if (is_control(message.opcode)) return Status::kMessage;
+    if (!joining_) begun_ = {message.opcode, {}};
+    begun_.payload += message.payload;
+    bad_ = begun_.payload.size() > kMostMessage_bytes;
+    joining_ = !last;
+    if (bad_ || joining_) continue;
+    message = std::move(begun_);
+    return Status::kMessage;
+  }
+  return Status::kBad;
+}
+
+}  // namespace roborun::viewer
