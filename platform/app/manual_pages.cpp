@@ -16,7 +16,7 @@ std::vector<const CLI::App*> commands_of(const CLI::App& app) {
 std::string words_of(const CLI::App& app) {
   std::string words;
   for (const CLI::App* at = &app; at->get_parent() != nullptr; at = at->get_parent())
-    words = words.empty() ? at->get_name() : at->get_name() + " " + words;
+    words = words.empty() ? at->get_name() : fmt::format("{} {}", at->get_name(), words);
   return words;
 }
 
@@ -74,14 +74,22 @@ std::string options_of(const CLI::App& app) {
   return text;
 }
 
-/// Subcommands in the page of their command, as deep as they go.
+/// Subcommands in the page of their command, each before those below it.
 std::string sections_of(const CLI::App& app) {
   std::string text;
-  for (const CLI::App* sub : commands_of(app)) {
-    text += fmt::format(".SH \"{}\"\n{}\n{}", roff(words_of(*sub)), roff(sub->get_description()),
-                        options_of(*sub));
-    if (!sub->get_footer().empty()) text += fmt::format(".PP\n.nf\n{}\n.fi\n", roff(sub->get_footer()));
-    text += sections_of(*sub);
+  std::vector<const CLI::App*> todo;
+  const auto push_commands_of = [&todo](const CLI::App& of) {
+    const std::vector<const CLI::App*> below = commands_of(of);
+    todo.insert(todo.end(), below.rbegin(), below.rend());
+  };
+  push_commands_of(app);
+  while (!todo.empty()) {
+    const CLI::App& sub = *todo.back();
+    todo.pop_back();
+    text +=
+        fmt::format(".SH \"{}\"\n{}\n{}", roff(words_of(sub)), roff(sub.get_description()), options_of(sub));
+    if (!sub.get_footer().empty()) text += fmt::format(".PP\n.nf\n{}\n.fi\n", roff(sub.get_footer()));
+    push_commands_of(sub);
   }
   return text;
 }
