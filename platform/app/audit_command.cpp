@@ -46,6 +46,7 @@ struct AuditOptions {
   bool best_effort{false};
   std::string html;
   std::string trace;
+  std::string log;
   std::string samples;
   std::string instructions;
   std::vector<std::string> require;
@@ -211,7 +212,10 @@ int audit(const AuditOptions& options) {
   for (const std::string& path : {options.vehicle, options.settings, options.profile, options.instructions})
     inputs.push_back(path);
   if (options.profile == "host") inputs.push_back(board::default_host_path({}));
-  input::check_outputs({{"--html", options.html}, {"--trace", options.trace}, {"--samples", options.samples}},
+  input::check_outputs({{"--html", options.html},
+                        {"--trace", options.trace},
+                        {"--samples", options.samples},
+                        {"--log", options.log}},
                        inputs);
   if (!options.settings.empty()) mission::load_settings(options.settings, config.mission);
   config.inject = injection_of(options.spin);
@@ -219,6 +223,8 @@ int audit(const AuditOptions& options) {
   const std::uint64_t seed = input::seed_of("--seed", options.seed);
   const sitl::World world = sitl::generate(environment.knobs, sitl::Mission::kPackageDelivery, seed);
   config.mission.seed = seed;
+  config.mission.log = options.log;
+  config.mission.profile_name = options.profile;
   config.mission.flight.minor_frame = core::minor_frame_of(options.rate_Hz);
   config.seconds = options.seconds;
   config.best_effort = options.best_effort;
@@ -315,6 +321,8 @@ void add_audit_command(CLI::App& app, std::function<int()>& run) {
   command->add_option("--html", options->html, "Write the report as one HTML file with plots");
   command->add_option("--trace", options->trace,
                       "Write every slot of every frame for Perfetto (ui.perfetto.dev)");
+  command->add_option("--log", options->log,
+                      "Write the flight, too, as an MCAP file: roborun report, Foxglove, PlotJuggler");
   command->add_option("--samples", options->samples,
                       "Write every frame and slot as an array of NumPy (numpy.load)");
   command->add_option("--instructions", options->instructions,

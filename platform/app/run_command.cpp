@@ -21,9 +21,12 @@
 #include "platform/input/stop_signal.hpp"
 #include "platform/live/live_run.hpp"
 #include "platform/mavlink/mission_file.hpp"
+#include "platform/mission/flight_story.hpp"
 #include "platform/mission/mission_config.hpp"
+#include "platform/report/flight_page.hpp"
 #include "platform/report/progress_line.hpp"
 #include "platform/vehicle/vehicle_file.hpp"
+#include "platform/viewer/live_server.hpp"
 
 namespace roborun::app {
 namespace {
@@ -44,11 +47,13 @@ struct RunOptions {
   double cruise_m{0.0};
   double seconds{3600.0};
   double wait_s{5.0};
+  std::optional<std::uint16_t> live{};  ///< Port.
   bool best_effort{false};
   bool json{false};
 };
 
-constexpr double kAround_m = 100.0;  // of start and goal
+constexpr std::uint16_t kLivePort = 8765;  // as Foxglove asks first
+constexpr double kAround_m = 100.0;        // of start and goal
 constexpr double kLowest_m = 1.5;
 constexpr double kHighest_m = 10.0;
 
@@ -258,14 +263,26 @@ int run_flight(const RunOptions& options) {
   if (options.guard) {
     if (!options.goal.empty() || !options.mission.empty() || options.arm || options.autopilot != "none")
       throw InputError("--guard: commands nothing: must go without --goal, --mission, --autopilot and --arm");
-    if (!options.log.empty() || !options.ground.empty() || !options.key.empty())
+    if (!options.log.empty() || options.live || !options.ground.empty() || !options.key.empty())
       throw InputError(
-          "--guard: signs nothing, and logs nothing: must go without --signing-key, --ground and --log");
+          "--guard: signs nothing, and logs nothing: must go without --signing-key, --ground, --log and "
+          "--live");
     return run_guard(
         {options.vehicle, options.link, options.port, options.seconds, options.wait_s, options.json});
   }
   input::check_outputs({{"--log", options.log}}, {options.vehicle, options.mission, options.profile});
+  if (options.live && options.log.empty())
+    throw InputError("--live: shows the log while it is written: must go with --log FILE.mcap");
   live::LiveConfig config = config_of(options);
+  std::optional<viewer::LiveServer> server;
+  if (options.live) {
+    server.emplace(*options.live, [&options] {
+      return report::flight_page_html(mission::story_of(options.log, {}, true).page);
+    });
+    config.viewer = &*server;
+    fmt::print(stderr, "roborun: --live: http://127.0.0.1:{0}/, Foxglove: ws://127.0.0.1:{0}\n",
+               server->port());
+  }
   const input::StopOnSignal stop;
   config.stop = &input::StopOnSignal::requested;
   std::optional<report::ProgressLine> line(std::in_place);
@@ -399,6 +416,17 @@ void add_run_command(CLI::App& app, std::function<int()>& run) {
              "How long to wait for what is missing at the start, seconds");
   command->add_option("--log", options->log,
                       "Write what the flight did and why to this MCAP file, for Foxglove and PlotJuggler");
+  command
+      ->add_option_function<std::string>(
+          "--live",
+          [options](const std::string& port) {
+            options->live = static_cast<std::uint16_t>(
+                port.empty() ? kLivePort : input::whole_of("--live", port, 0, 65535));
+          },
+          "Show the flight while it goes on, on this port of 127.0.0.1: a page, and topics for Foxglove "
+          "(Open connection, Foxglove WebSocket); 0: a free port; needs --log")
+      ->expected(0, 1)
+      ->default_str(std::to_string(kLivePort));
   command->add_flag("--best-effort", options->best_effort,
                     "Run without the real-time privileges, locked memory or CPUs that are missing here");
   command->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
