@@ -167,7 +167,8 @@ int plant(const PlantOptions& options) {
   if (const auto origin = origin_of(options.origin)) config.origin = *origin;
   config.autopilot = autopilot_of(options);
   if (options.bus_sensors || !options.can.empty()) {
-    if (config.autopilot || !options.physics.empty()) throw InputError("--bus-sensors, --can: go without --autopilot and --physics");
+    if (config.autopilot || !options.physics.empty())
+      throw InputError("--bus-sensors, --can: go without --autopilot and --physics");
     config.on_bus = {options.can};
   }
   config.physics = physics_of(options);

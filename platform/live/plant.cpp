@@ -132,12 +132,11 @@ Plant::Plant(const sitl::World& world, const PlantConfig& config)
       aircraft_(flight_.vehicle, config.mission.simulator, mission::ground_below(world), config.mission.seed,
                 flight_.minor_frame, pictures_),
       physics_(config.physics ? physics_link(*config.physics, config.origin) : nullptr),
-      side_(config.physics ? nullptr
-            : config.autopilot
-                ? autopilot_side(aircraft_, flight_.vehicle, flight_.minor_frame, *config.autopilot,
-                                 config.origin)
-                : port_side(aircraft_, sitl::rig_of(config.mission.simulator), names_, config.origin,
-                            config.on_bus)) {
+      side_(config.physics     ? nullptr
+            : config.autopilot ? autopilot_side(aircraft_, flight_.vehicle, flight_.minor_frame,
+                                                *config.autopilot, config.origin)
+                               : port_side(aircraft_, sitl::rig_of(config.mission.simulator), names_,
+                                           config.origin, config.on_bus)) {
   plant_.stand_in(world);
 }
 
