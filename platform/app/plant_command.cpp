@@ -166,12 +166,12 @@ int plant(const PlantOptions& options) {
   config.pictures = !options.no_pictures;
   if (const auto origin = origin_of(options.origin)) config.origin = *origin;
   config.autopilot = autopilot_of(options);
+  config.physics = physics_of(options);
   if (options.bus_sensors || !options.can.empty()) {
-    if (config.autopilot || !options.physics.empty())
+    if (config.autopilot || config.physics)
       throw InputError("--bus-sensors, --can: go without --autopilot and --physics");
     config.on_bus = {options.can};
   }
-  config.physics = physics_of(options);
   if (options.seconds > 0.0) config.seconds = options.seconds;
   const sitl::World world = plant_world(options.common, config.mission);
   const input::StopOnSignal stop;

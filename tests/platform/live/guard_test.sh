@@ -29,7 +29,7 @@ try:
   while True: out.write(s.recv(2048))
 except TimeoutError: pass' "$port" "$folder/heard.bin" &
 ear=$!
-sleep 0.5
+for _ in $(seq 300); do [[ -e "$folder/heard.bin" ]] && break; sleep 0.1; done  # it listens from then on
 "$roborun" run --guard --vehicle paper --link "udpout://127.0.0.1:$port" --port "$name" --wait 30 --seconds 5 --json >"$folder/guard.json"
 code=$?
 wait $ear

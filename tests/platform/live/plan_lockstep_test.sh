@@ -28,6 +28,6 @@ a = json.loads(sys.stdin.readlines()[-1])
 a = a.get("result", a)
 print("blocked", a["reason"], a["mission_time_s"], a["goals"])
 sys.exit(not (a["reason"] == "goal_blocked" and a["mission"]["done"] == 0 and a["mission_time_s"] < 60.0))'
-code=$?
+code=${PIPESTATUS[1]}  # the flight's own says that its goal was not reached
 rm -f "${TMPDIR:-/tmp}/blocked-$$.waypoints"
 exit $code

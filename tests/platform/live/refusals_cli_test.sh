@@ -57,7 +57,7 @@ says 2 "No such file or directory: start roborun plant --port $name --no-picture
 # With an autopilot between.
 url=udpin://127.0.0.1:$((20000 + RANDOM % 12000))
 says 2 "--port: must name the ports" run "${fly[@]}" --link "$url"
-says 2 "--port: goes with a MAVLink --link" run "${fly[@]}" --link "port:$name" --port x
+says 2 "--port: goes with a MAVLink or CAN --link" run "${fly[@]}" --link "port:$name" --port x
 says 2 "--autopilot: must say who flies" run "${fly[@]}" --link "$url" --port "$name"
 says 2 "--autopilot: goes with a MAVLink --link" run "${fly[@]}" --link "port:$name" --autopilot px4
 says 2 "--autopilot: unknown autopilot 'nix'" run "${fly[@]}" --link "$url" --port "$name" --autopilot nix
