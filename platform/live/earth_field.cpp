@@ -54,14 +54,17 @@ class Legendre {
   [[nodiscard]] const Value& operator()(int n, int m) const { return value_.at(index(n, m)); }
 
  private:
-  static std::size_t index(int n, int m) { return static_cast<std::size_t>(n * (kDegrees + 1) + m); }
+  static constexpr std::size_t kOrders = kDegrees + 1;
+  static std::size_t index(int n, int m) {
+    return static_cast<std::size_t>(n) * kOrders + static_cast<std::size_t>(m);
+  }
   Value& at(int n, int m) { return value_.at(index(n, m)); }
-  std::array<Value, (kDegrees + 1) * (kDegrees + 1)> value_{};
+  std::array<Value, kOrders * kOrders> value_{};
 };
 
 }  // namespace
 
-Vector3 earth_field_W_gauss(double latitude_deg, double longitude_deg) {
+Vector3 earth_field_gauss(double latitude_deg, double longitude_deg) {
   constexpr double kNearPole = 1e-6;
   constexpr double kGauss_nT = 1e5;
   const double from_pole_rad = (90.0 - latitude_deg) * core::kDegree,

@@ -58,7 +58,7 @@ firmware_if::MotorCommand motors_of(const mav::HilActuatorControls& m) noexcept 
 Px4Physics::Px4Physics(int port, const sensor_port::EarthPlace& origin)
     : origin_(origin),
       frame_(origin),
-      field_W_gauss_(earth_field_W_gauss(origin.latitude_deg, origin.longitude_deg)),
+      field_W_gauss_(earth_field_gauss(origin.latitude_deg, origin.longitude_deg)),
       server_(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)) {
   sockaddr_in address{};
   address.sin_family = AF_INET;

@@ -100,14 +100,14 @@ TEST(EarthFieldTest, IsThatOfTheCharts) {
   };
   for (const Place& place : {Place{47.4, 8.5, 3.0, 63.3, 0.482}, Place{-33.9, 151.2, 12.7, -64.3, 0.570},
                              Place{37.8, -122.4, 13.2, 61.0, 0.487}}) {
-    const Vector3 field = earth_field_W_gauss(place.latitude_deg, place.longitude_deg);
+    const Vector3 field = earth_field_gauss(place.latitude_deg, place.longitude_deg);
     constexpr double kDegree = M_PI / 180.0;
     EXPECT_NEAR(std::atan2(field.x(), field.y()) / kDegree, place.declination_deg, 3.0);
     EXPECT_NEAR(std::atan2(-field.z(), std::hypot(field.x(), field.y())) / kDegree, place.inclination_deg,
                 3.0);
     EXPECT_NEAR(field.norm(), place.gauss, 0.03 * place.gauss);
   }
-  EXPECT_TRUE(earth_field_W_gauss(90.0, 0.0).allFinite()) << "at the pole";
+  EXPECT_TRUE(earth_field_gauss(90.0, 0.0).allFinite()) << "at the pole";
 }
 
 }  // namespace
