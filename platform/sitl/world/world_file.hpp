@@ -49,8 +49,8 @@ struct WorldOptions {
 [[nodiscard]] std::vector<WorldKey> world_keys();
 
 /// The occupied space of an OctoMap file in memory (.ot if `full`, otherwise .bt). Iterative, at most 16
-/// levels deep, and never allocates more than the bytes justify; refuses what is truncated, too long or not
-/// OctoMap.
+/// levels deep; refuses what is truncated, too long or not OctoMap. A leaf of a coarse level is filled cell by
+/// cell, so that a few bytes can mean as many cells as a grid may have (512 MB).
 [[nodiscard]] VoxelGrid parse_octomap(std::span<const unsigned char> bytes, bool full,
                                       const std::string& name);
 
