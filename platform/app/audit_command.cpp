@@ -28,6 +28,7 @@
 #include "platform/report/audit_verdict.hpp"
 #include "platform/report/instruction_counts.hpp"
 #include "platform/report/sha256.hpp"
+#include "platform/rt/confinement.hpp"
 #include "platform/sitl/world/generator.hpp"
 
 namespace roborun::app {
@@ -251,6 +252,9 @@ int audit(const AuditOptions& options) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   const input::StopOnSignal stop;
   config.stop = &input::StopOnSignal::requested;
+  if (const std::string kept = rt::drop_capabilities(); !kept.empty())
+    fmt::print(stderr, "roborun: {}\n", kept);
+  config.confine = rt::confine;
   report::AuditReport result = mission::run_real_time(world, config, [&](double done_s) {
     if (terminal) fmt::print(stderr, "\raudit {:3.0f} of {:.0f} s   ", done_s, options.seconds);
   });

@@ -25,6 +25,7 @@
 #include "platform/mission/mission_config.hpp"
 #include "platform/report/flight_page.hpp"
 #include "platform/report/progress_line.hpp"
+#include "platform/rt/confinement.hpp"
 #include "platform/vehicle/vehicle_file.hpp"
 #include "platform/viewer/live_server.hpp"
 
@@ -274,6 +275,9 @@ int run_flight(const RunOptions& options) {
   if (options.live && options.log.empty())
     throw InputError("--live: shows the log while it is written: must go with --log FILE.mcap");
   live::LiveConfig config = config_of(options);
+  if (const std::string kept = rt::drop_capabilities(); !kept.empty())
+    fmt::print(stderr, "roborun: {}\n", kept);
+  config.confine = rt::confine;
   std::optional<viewer::LiveServer> server;
   if (options.live) {
     server.emplace(*options.live, [&options] {

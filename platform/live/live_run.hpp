@@ -35,9 +35,11 @@ struct LiveConfig {
   std::optional<Route> route{};                          ///< Of a mission; flight.goal_W is its first goal.
   double seconds{3600.0};                                ///< Then it lands where it is.
   double wait_s{5.0};                                    ///< For what is missing at the start.
-  std::string log{};             ///< File for the log of the flight; empty: none. It does not replay.
-  log::LogViewer* viewer{};      ///< Of that log; may be null, outlives the flight.
-  bool best_effort{false};       ///< As rt::LaneSetConfig.
+  std::string log{};         ///< File for the log of the flight; empty: none. It does not replay.
+  log::LogViewer* viewer{};  ///< Of that log; may be null, outlives the flight.
+  bool best_effort{false};   ///< As rt::LaneSetConfig.
+  /// Called once the lanes run, as rt::confine(); what it says is missing. May be empty.
+  std::function<std::string()> confine{};
   std::function<bool()> stop{};  ///< Asked twenty times a second: true: it lands where it is. May be empty.
 };
 

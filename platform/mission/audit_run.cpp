@@ -326,6 +326,7 @@ class RealTimeRun {
   std::array<Injected, core::kLaneCount> program_;
   std::array<Noted, core::kLaneCount> noted_;
   rt::LaneSet lanes_;
+  std::string not_confined_;
   Evidence evidence_;
   MonotonicTime first_release_{};
 };
@@ -366,7 +367,10 @@ void RealTimeRun::start() {
   first_release_ = lanes_.choose_first_release();
   aircraft_.start(first_release_ - flight_config_.minor_frame);
   begin_log();
-  const std::string error = lanes_.start();
+  std::string error = lanes_.start();
+  if (error.empty() && config_.confine) not_confined_ = config_.confine();
+  if (!not_confined_.empty() && !config_.best_effort)
+    error = not_confined_ + " (--best-effort runs on without)";
   if (error.empty()) return;
   stop();
   throw InputError(error);
@@ -580,8 +584,9 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
   report::AuditReport report;
   const rt::IdleLatencyHold idle;
   fly(progress, report);
-  report.best_effort = !lanes_.missing().empty();
   report.missing = lanes_.missing();
+  if (!not_confined_.empty()) report.missing.push_back(not_confined_);
+  report.best_effort = !report.missing.empty();
   report.load = config_.load;
   report.rate_Hz = 1.0 / seconds(flight_config_.minor_frame);
   report.heap_sealed = rt::heap_seal_works();
