@@ -183,10 +183,11 @@ V4l2Capture::Got V4l2Capture::next(Image& image, Nanos patience) {
       std::memcpy(pixels_.data() + v * row, from + v * row_bytes_, row);
     const bool is_monotonic =
         (buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
-    // Without a stamp that can be understood: when it came.
-    image.stamp_ns = is_monotonic ? std::int64_t{buffer.timestamp.tv_sec} * 1'000'000'000 +
-                                        std::int64_t{buffer.timestamp.tv_usec} * 1000
-                                  : calls_.now().count();
+    // Without a stamp that can be true: when it came.
+    image.stamp_ns = calls_.now().count();
+    if (is_monotonic)
+      image.stamp_ns = std::min(image.stamp_ns, std::int64_t{buffer.timestamp.tv_sec} * 1'000'000'000 +
+                                                    std::int64_t{buffer.timestamp.tv_usec} * 1000);
     image.sequence = buffer.sequence;
     image.pixels = pixels_;
   }

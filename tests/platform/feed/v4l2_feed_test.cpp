@@ -26,7 +26,8 @@ struct Event {
   std::uint16_t raw{2500};
   std::uint32_t sequence{0}, flags{V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC}, bytes{kRow_bytes * kHeight};
   std::uint32_t index{0};
-  bool silence{false};  ///< Nothing comes, for as long as it waits.
+  std::int64_t ahead_us{0};  ///< Of the clock.
+  bool silence{false};       ///< Nothing comes, for as long as it waits.
 };
 
 /// A device as data: what each call answers.
@@ -138,7 +139,7 @@ class FakeVideo final : public VideoCalls {
     buffer.sequence = event.sequence;
     buffer.flags = event.flags;
     buffer.bytesused = event.bytes;
-    const std::int64_t us = time.count() / 1000;
+    const std::int64_t us = time.count() / 1000 + event.ahead_us;
     buffer.timestamp = {us / 1'000'000, us % 1'000'000};
     if (event.index < memory_.size())
       for (std::uint32_t v = 0; v < kHeight; ++v)
@@ -313,7 +314,7 @@ TEST(V4l2Feed, LeavesOutDamagedImagesAndSaysSoOnce) {
   EXPECT_EQ(sut.said.size(), 1U);
 }
 
-TEST(V4l2Feed, StampsWithItsOwnClockWhereTheDriversIsUnknown) {
+TEST(V4l2Feed, StampsWithItsOwnClockWhereTheDriversIsUnknownOrAhead) {
   FakeVideo video;
   Event unknown = image(0);
   unknown.flags = V4L2_BUF_FLAG_TIMESTAMP_UNKNOWN;
@@ -323,6 +324,12 @@ TEST(V4l2Feed, StampsWithItsOwnClockWhereTheDriversIsUnknown) {
   firmware_if::DepthFrame frame;
   ASSERT_EQ(sut.port.read(frame), Status::kOk);
   EXPECT_EQ(frame.stamp.time_since_epoch(), video.time);
+  Event ahead = image(1);
+  ahead.ahead_us = 170'000;
+  video.events = {ahead};
+  (void)sut.run();
+  ASSERT_EQ(sut.port.read(frame), Status::kOk);
+  EXPECT_EQ(frame.stamp.time_since_epoch(), video.time) << "no image is taken after it came";
 }
 
 TEST(V4l2Feed, OpensALostCameraAgainAndGoesOn) {
