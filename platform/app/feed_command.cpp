@@ -8,6 +8,8 @@
 #include <thread>
 
 #include "platform/app/exit_code.hpp"
+#include "platform/app/feed_dds_command.hpp"
+#include "platform/app/feed_v4l2_command.hpp"
 #include "platform/app/options.hpp"
 #include "platform/app/plant_arguments.hpp"
 #include "platform/app/recording_arguments.hpp"
@@ -21,13 +23,7 @@
 namespace roborun::app {
 namespace {
 
-void open_port(sensor_port::PortWriter& port, const std::string& name, std::uint32_t kind,
-               std::size_t most_bytes) {
-  constexpr std::uint32_t kSlots = 8;
-  const std::string path = sensor_port::port_path(name);
-  const std::string wrong = port.open(path, kind, most_bytes, kSlots);
-  if (!wrong.empty()) throw InputError(fmt::format("{}: {}", path, wrong));
-}
+constexpr std::uint32_t kSlots = 8;
 
 struct FeedFilesOptions {
   RecordingArguments recording;
@@ -61,8 +57,11 @@ int feed_files(const FeedFilesOptions& options) {
     throw InputError(fmt::format("{}: holds clouds: must be depth images", options.recording.from));
   // All images are of one size.
   sensor_port::PortWriter images, odometry;
-  open_port(images, options.port, ROBORUN_PORT_DEPTH, recording.load(0).front().frame.depth_m.size_bytes());
-  if (!options.odometry.empty()) open_port(odometry, options.odometry, ROBORUN_PORT_ODOMETRY, 0);
+  sensor_port::open_port(images, sensor_port::port_path(options.port), ROBORUN_PORT_DEPTH,
+                         recording.load(0).front().frame.depth_m.size_bytes(), kSlots);
+  if (!options.odometry.empty())
+    sensor_port::open_port(odometry, sensor_port::port_path(options.odometry), ROBORUN_PORT_ODOMETRY, 0,
+                           kSlots);
   const double step_s = 1.0 / options.rate_Hz;
   const input::StopOnSignal stop;
   report::ProgressLine line;
@@ -127,6 +126,8 @@ void add_feed_plant(CLI::App& feed, std::function<int()>& run) {
 void add_feed_command(CLI::App& app, std::function<int()>& run) {
   CLI::App* feed = app.add_subcommand("feed", "Feeders: processes that write to sensor ports (roborun port)");
   feed->require_subcommand(1);
+  add_feed_v4l2_command(*feed, run);
+  add_feed_dds_command(*feed, run);
   add_feed_plant(*feed, run);
   const auto options = std::make_shared<FeedFilesOptions>();
   CLI::App* files = feed->add_subcommand("files", "Recorded depth images, as often as asked");

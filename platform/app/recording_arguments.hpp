@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <string>
 
 #include "platform/dataset/recording.hpp"
@@ -15,6 +16,8 @@ struct RecordingArguments {
 
 /// Adds --from, --range, --intrinsics and --depth-scale. `arguments` must outlive the command.
 void add_recording_arguments(CLI::App& command, RecordingArguments& arguments);
+/// FX,FY,CX,CY in pixels. Throws InputError that names --intrinsics.
+[[nodiscard]] std::array<double, 4> intrinsics_of(const std::string& text);
 /// Throws InputError that names the option.
 [[nodiscard]] dataset::RecordingOptions recording_options(const RecordingArguments& arguments);
 

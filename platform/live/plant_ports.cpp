@@ -1,12 +1,9 @@
 #include "platform/live/plant_ports.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <limits>
 
 #include "core/geometry/vector.hpp"
-#include "platform/input/input_error.hpp"
 
 namespace roborun::live {
 namespace {
@@ -14,23 +11,8 @@ namespace {
 constexpr std::uint32_t kPictureSlots = 4;
 constexpr std::uint32_t kSampleSlots = 1024;
 
-void open(sensor_port::PortWriter& port, const std::string& path, std::uint32_t kind, std::size_t most_bytes,
-          std::uint32_t slots) {
-  const std::string wrong = port.open(path, kind, most_bytes, slots);
-  if (!wrong.empty()) throw InputError(fmt::format("{}: {}", path, wrong));
-}
-
 roborun_port_stamp stamp_of(MonotonicTime stamp, std::uint32_t sequence, Nanos shift) noexcept {
   return {(stamp.time_since_epoch() + shift).count(), sequence, 0};
-}
-
-roborun_port_mount mount_of(const firmware_if::CameraMount& mount) noexcept {
-  const Quaternion q(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(mount.R_BC.data()));
-  roborun_port_mount out{};
-  const std::array<double, 4> wxyz{q.w(), q.x(), q.y(), q.z()};
-  for (std::size_t i = 0; i < 4; ++i) out.q_BS[i] = static_cast<float>(wxyz.at(i));
-  for (std::size_t i = 0; i < 3; ++i) out.p_BS_m[i] = static_cast<float>(mount.p_BC_m.at(i));
-  return out;
 }
 
 }  // namespace
@@ -39,12 +21,12 @@ PicturePorts::PicturePorts(const SensorRig& rig, const std::vector<std::size_t>&
                            const sensor_port::VehiclePorts& ports) {
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     const CameraSpec& camera = rig.cameras[i];
-    open(camera_.emplace_back(), ports.camera(i), ROBORUN_PORT_DEPTH,
-         sizeof(float) * camera.width * camera.height, kPictureSlots);
+    sensor_port::open_port(camera_.emplace_back(), ports.camera(i), ROBORUN_PORT_DEPTH,
+                           sizeof(float) * camera.width * camera.height, kPictureSlots);
   }
   for (std::size_t i = 0; i < rig.lidars.size(); ++i) {
-    open(lidar_.emplace_back(), ports.lidar(i), ROBORUN_PORT_CLOUD,
-         sizeof(roborun_port_point) * most_points.at(i), kPictureSlots);
+    sensor_port::open_port(lidar_.emplace_back(), ports.lidar(i), ROBORUN_PORT_CLOUD,
+                           sizeof(roborun_port_point) * most_points.at(i), kPictureSlots);
     points_.resize(std::max(points_.size(), most_points.at(i)));
   }
 }
@@ -52,7 +34,7 @@ PicturePorts::PicturePorts(const SensorRig& rig, const std::vector<std::size_t>&
 void PicturePorts::write(std::size_t camera, const firmware_if::DepthFrame& f,
                          const firmware_if::CameraMount& mount, Nanos shift) noexcept {
   roborun_port_depth d = sensor_port::depth_header(f, stamp_of(f.stamp, f.sequence, shift));
-  d.mount = mount_of(mount);
+  d.mount = sensor_port::port_mount(mount);
   (void)camera_[camera].write(d, std::as_bytes(f.depth_m));
 }
 
@@ -68,7 +50,7 @@ void PicturePorts::write(std::size_t lidar, const firmware_if::LidarSweep& sweep
   c.points = static_cast<std::uint32_t>(count);
   c.range_min_m = sweep.range_min_m;
   c.range_m = sweep.range_m;
-  c.mount = mount_of(mount);
+  c.mount = sensor_port::port_mount(mount);
   (void)lidar_[lidar].write(c, std::as_bytes(std::span(points_).first(count)));
 }
 
@@ -76,13 +58,14 @@ NavigationPorts::NavigationPorts(const SensorRig& rig, const sensor_port::Vehicl
                                  const sensor_port::EarthPlace& origin, bool on_bus)
     : frame_(origin), origin_height_m_(origin.height_m) {
   if (!on_bus) {
-    open(imu_, ports.imu(), ROBORUN_PORT_IMU, 0, kSampleSlots);
-    if (rig.gnss != GnssModel::kNone) open(gnss_, ports.gnss(), ROBORUN_PORT_GNSS, 0, kSampleSlots);
-    open(pressure_, ports.pressure(), ROBORUN_PORT_PRESSURE, 0, kSampleSlots);
+    sensor_port::open_port(imu_, ports.imu(), ROBORUN_PORT_IMU, 0, kSampleSlots);
+    if (rig.gnss != GnssModel::kNone)
+      sensor_port::open_port(gnss_, ports.gnss(), ROBORUN_PORT_GNSS, 0, kSampleSlots);
+    sensor_port::open_port(pressure_, ports.pressure(), ROBORUN_PORT_PRESSURE, 0, kSampleSlots);
   }
   if (rig.odometry != OdometryModel::kNone)
-    open(odometry_, ports.odometry(), ROBORUN_PORT_ODOMETRY, 0, kSampleSlots);
-  open(lines_, ports.lines(), ROBORUN_PORT_LINES, 0, kSampleSlots);
+    sensor_port::open_port(odometry_, ports.odometry(), ROBORUN_PORT_ODOMETRY, 0, kSampleSlots);
+  sensor_port::open_port(lines_, ports.lines(), ROBORUN_PORT_LINES, 0, kSampleSlots);
 }
 
 void NavigationPorts::write(const firmware_if::ImuSample& sample, Nanos shift) noexcept {
@@ -132,7 +115,7 @@ void NavigationPorts::write(const firmware_if::OdometrySample& sample, Nanos shi
 }
 
 TruthPort::TruthPort(const sensor_port::VehiclePorts& ports) {
-  open(port_, ports.truth(), ROBORUN_PORT_ODOMETRY, 0, kSampleSlots);
+  sensor_port::open_port(port_, ports.truth(), ROBORUN_PORT_ODOMETRY, 0, kSampleSlots);
 }
 
 void TruthPort::write(MonotonicTime now, const Vector3& p_WB, const Quaternion& q_WB, Nanos shift) noexcept {

@@ -1,11 +1,16 @@
 /// A port that this process writes.
 #pragma once
 
+#include <fmt/format.h>
+
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
 
+#include "core/geometry/vector.hpp"
 #include "firmware_if/depth_camera.hpp"
+#include "platform/input/input_error.hpp"
 #include "platform/sensor_port/roborun_port.h"
 
 namespace roborun::sensor_port {
@@ -26,6 +31,16 @@ namespace roborun::sensor_port {
   d.range_m = f.range_m;
   d.mount.q_BS[0] = 1.0F;
   return d;
+}
+
+/// Where a sensor sits, as a port says it.
+[[nodiscard]] inline roborun_port_mount port_mount(const firmware_if::CameraMount& mount) noexcept {
+  const Quaternion q(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(mount.R_BC.data()));
+  roborun_port_mount out{};
+  const std::array<double, 4> wxyz{q.w(), q.x(), q.y(), q.z()};
+  for (std::size_t i = 0; i < 4; ++i) out.q_BS[i] = static_cast<float>(wxyz.at(i));
+  for (std::size_t i = 0; i < 3; ++i) out.p_BS_m[i] = static_cast<float>(mount.p_BC_m.at(i));
+  return out;
 }
 
 class PortWriter {
@@ -54,5 +69,12 @@ class PortWriter {
  private:
   roborun_port_writer writer_{-1, 0, nullptr};
 };
+
+/// As PortWriter::open(). Throws InputError that names the path.
+inline void open_port(PortWriter& port, const std::string& path, std::uint32_t kind, std::size_t most_bytes,
+                      std::uint32_t slots) {
+  const std::string wrong = port.open(path, kind, most_bytes, slots);
+  if (!wrong.empty()) throw InputError(fmt::format("{}: {}", path, wrong));
+}
 
 }  // namespace roborun::sensor_port

@@ -83,6 +83,21 @@ void append_frame(std::string& to, Opcode opcode, std::string_view payload) {
   to.append(payload);
 }
 
+std::string masked_frame(Opcode opcode, std::string_view payload, bool last) {
+  const std::string key = "\x12\x34\x56\x78";
+  std::string frame(1, static_cast<char>(static_cast<unsigned>(opcode) | (last ? 0x80U : 0U)));
+  if (payload.size() < 126) {
+    frame += static_cast<char>(0x80U | payload.size());
+  } else {
+    frame += static_cast<char>(0x80U | 126U);
+    append_big_endian(frame, payload.size(), 2);
+  }
+  frame += key;
+  for (std::size_t i = 0; i < payload.size(); ++i)
+    frame += static_cast<char>(payload[i] ^ key[i % key.size()]);
+  return frame;
+}
+
 FrameReader::Status FrameReader::take(Message& frame, bool& last) {
   const auto byte = [this](std::size_t at) { return static_cast<std::uint8_t>(bytes_[at]); };
   if (bytes_.size() < 2) return Status::kMore;
@@ -95,20 +110,26 @@ FrameReader::Status FrameReader::take(Message& frame, bool& last) {
   const bool is_known =
       frame.opcode <= Opcode::kBinary || (frame.opcode >= Opcode::kClose && frame.opcode <= Opcode::kPong);
   const bool is_whole_control = last && length <= 125;
-  if (!is_masked || !is_known || (first & 0x70U) != 0 || (is_control(frame.opcode) && !is_whole_control))
+  const std::size_t key_bytes = is_masked ? kKey_bytes : 0;
+  if (is_masked != (peer_ == Peer::kClient) || !is_known || (first & 0x70U) != 0 ||
+      (is_control(frame.opcode) && !is_whole_control))
     return Status::kBad;
   std::size_t head = 2;
-  if (length == 127) return Status::kBad;  // more than kMostMessage_bytes
-  if (length == 126) {
-    head = 4;
+  if (length == 127 && peer_ == Peer::kClient) return Status::kBad;  // more than is taken
+  if (length >= 126) {
+    const std::size_t length_bytes = length == 126 ? 2 : 8;
+    head += length_bytes;
     if (bytes_.size() < head) return Status::kMore;
-    length = std::size_t{byte(2)} << 8U | byte(3);
+    std::uint64_t value = 0;
+    for (std::size_t i = 2; i < head; ++i) value = value << 8U | byte(i);
+    if (value >= most_bytes()) return Status::kBad;
+    length = static_cast<std::size_t>(value);
   }
-  if (bytes_.size() < head + kKey_bytes + length) return Status::kMore;
-  frame.payload = bytes_.substr(head + kKey_bytes, length);
-  for (std::size_t i = 0; i < length; ++i)
+  if (bytes_.size() < head + key_bytes + length) return Status::kMore;
+  frame.payload = bytes_.substr(head + key_bytes, length);
+  for (std::size_t i = 0; i < length && is_masked; ++i)
     frame.payload[i] = static_cast<char>(frame.payload[i] ^ bytes_[head + i % kKey_bytes]);
-  bytes_.erase(0, head + kKey_bytes + length);
+  bytes_.erase(0, head + key_bytes + length);
   return Status::kMessage;
 }
 
@@ -123,7 +144,7 @@ FrameReader::Status FrameReader::next(Message& message) {
     if (is_control(message.opcode)) return Status::kMessage;
     if (!joining_) begun_ = {message.opcode, {}};
     begun_.payload += message.payload;
-    bad_ = begun_.payload.size() > kMostMessage_bytes;
+    bad_ = begun_.payload.size() > most_bytes();
     joining_ = !last;
     if (bad_ || joining_) continue;
     message = std::move(begun_);

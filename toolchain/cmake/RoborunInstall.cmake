@@ -6,7 +6,7 @@
 #   lib/cmake/roborun/                 find_package(roborun COMPONENTS flight | mission)
 #   share/roborun/{worlds,scenarios,vehicles}   what the program can fly at once
 #   share/man, share/bash-completion, share/zsh, share/fish   made by the program itself: roborun manual
-#   lib/{systemd,udev,tmpfiles.d,roborun}, share/doc/roborun  the service of the bench and what it needs
+#   lib/{systemd,udev,tmpfiles.d,roborun}, share/doc/roborun  the service of the bench and what it needs, roborun-feed-dds
 #   share/doc/libroborun-dev/example, share/doc/roborun-doc   programs of one's own; all pages
 # Components: roborun, libroborun-dev, roborun-doc, one Debian package each (RoborunPackage.cmake).
 include(GNUInstallDirs)
@@ -29,7 +29,7 @@ set(_headers firmware_if core governor stages platform)
 foreach(_folder IN LISTS _headers)
   file(GLOB_RECURSE _files CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/${_folder}/*.hpp
        ${PROJECT_SOURCE_DIR}/${_folder}/*.h)
-  list(FILTER _files EXCLUDE REGEX "/example/|^platform/(app|evaluation)/")
+  list(FILTER _files EXCLUDE REGEX "/example/|^platform/(app|evaluation|feed)/")
   if(NOT ROBORUN_SIMULATOR)
     list(FILTER _files EXCLUDE REGEX "_backend/|^platform/[^f]")
   endif()
@@ -41,6 +41,9 @@ endforeach()
 
 if(ROBORUN_APP)
   install(TARGETS roborun RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT roborun)
+  if(TARGET roborun-feed-dds)
+    install(TARGETS roborun-feed-dds RUNTIME DESTINATION lib/roborun COMPONENT roborun)
+  endif()
   install(DIRECTORY platform/sitl/worlds platform/sitl/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/roborun COMPONENT roborun
           FILES_MATCHING PATTERN *.toml)
   install(DIRECTORY platform/vehicle/ DESTINATION ${CMAKE_INSTALL_DATADIR}/roborun/vehicles COMPONENT roborun FILES_MATCHING PATTERN *.toml)

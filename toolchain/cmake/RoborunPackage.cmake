@@ -36,7 +36,7 @@ set(CPACK_COMPONENT_ROBORUN-DOC_DESCRIPTION "navigation runtime for drones: guid
 if(CMAKE_CROSSCOMPILING)  # Debian's names, and what dpkg-shlibdeps would find out on such a machine
   set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE ${debian_architecture})
   set(CPACK_DEBIAN_ROBORUN_PACKAGE_DEPENDS
-      "libc6, libfmt9, libgpiod2, liboctomap1.9, libompl16, libpng16-16, libseccomp2, libstdc++6, libtinyxml2-9, libzstd1, zlib1g, libhwy1, passwd")
+      "libc6, libfmt9, libgpiod2, liboctomap1.9, libompl16, libddsc0debian, libpng16-16, libseccomp2, libstdc++6, libtinyxml2-9, libzstd1, zlib1g, libhwy1, passwd")
 else()
   set(CPACK_DEBIAN_ROBORUN_PACKAGE_SHLIBDEPS ON)
   set(CPACK_DEBIAN_ROBORUN_PACKAGE_DEPENDS passwd)
@@ -50,3 +50,6 @@ foreach(_component IN LISTS _components)
   list(APPEND _packaged ${_targets})
 endforeach()
 add_custom_target(packaged DEPENDS roborun ${_packaged})
+if(TARGET roborun-feed-dds)
+  add_dependencies(packaged roborun-feed-dds)
+endif()

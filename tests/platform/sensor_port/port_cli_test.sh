@@ -74,5 +74,15 @@ sleep 0.4
 says 2 "another process writes to this port" feed files --from "$folder" --port "$name"
 says 0 "16 x 12, 53 x 41 degrees, 100 % of the pixels know something, 0 % see nothing within 10.0 m, nearest 2.50 m" port check "$name"
 says 0 '"device":"odometry","ready":true' port check "$name-vio" --json
+# A camera of the kernel: what is none is refused, and makes no port (images: tests/platform/feed, and the ARM guest).
+camera=(--port "$name-v4l2")
+says 2 "--vehicle, --intrinsics: one of them must be given" feed v4l2 /dev/null "${camera[@]}"
+says 2 "/dev/null: is no video device" feed v4l2 /dev/null --vehicle x500 "${camera[@]}"
+says 2 "/dev/roborun-none: No such file" feed v4l2 /dev/roborun-none --intrinsics 16,16,8,8 "${camera[@]}"
+says 2 "--camera: 2: the vehicle 'x500' has 1 cameras" feed v4l2 /dev/null --vehicle x500 --camera 2 "${camera[@]}"
+says 2 "--camera: goes with --vehicle" feed v4l2 /dev/null --intrinsics 16,16,8,8 --camera 2 "${camera[@]}"
+says 2 "--range: goes with --intrinsics alone" feed v4l2 /dev/null --vehicle x500 --range 5 "${camera[@]}"
+says 2 "--intrinsics: '1,2': must be FX,FY,CX,CY" feed v4l2 /dev/null --intrinsics 1,2 "${camera[@]}"
+[[ -e $path-v4l2 ]] && { echo "FAILED a refused camera left a port"; failed=$((failed + 1)); }
 echo "$passed passed, $failed failed"
-[[ $failed -eq 0 && $passed -ge 20 ]]
+[[ $failed -eq 0 && $passed -ge 27 ]]

@@ -17,7 +17,6 @@
 #include "platform/input/input_error.hpp"
 #include "platform/log/mcap_reader.hpp"
 #include "platform/viewer/websocket.hpp"
-#include "tests/platform/viewer/masked_frame.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace roborun::viewer {
@@ -46,7 +45,7 @@ class Peer {
   }
   void subscribe(unsigned id, unsigned channel) const {
     const json one = {{"id", id}, {"channelId", channel}};
-    say(test::masked_frame(Opcode::kText, json{{"op", "subscribe"}, {"subscriptions", {one}}}.dump()));
+    say(masked_frame(Opcode::kText, json{{"op", "subscribe"}, {"subscriptions", {one}}}.dump()));
   }
   /// The answer to a request that ends the connection.
   std::string request(const std::string& line, const std::string& fields = {}) {
@@ -172,10 +171,10 @@ TEST_F(LiveServerTest, SpeaksTheFoxgloveProtocol) {
   for (int i = 2; i < 10; ++i) sut.show(2, i, "{}");
   for (int i = 2; i < 10; ++i) EXPECT_EQ(shown_in(*peer.frame()).time_ns, i) << "all of them, in order";
   sut.show(1, 5, "{}");  // nobody asked for it
-  peer.say(test::masked_frame(Opcode::kText, R"({"op":"unsubscribe","subscriptionIds":[7]})"));
-  peer.say(test::masked_frame(Opcode::kText, "no JSON"));
+  peer.say(masked_frame(Opcode::kText, R"({"op":"unsubscribe","subscriptionIds":[7]})"));
+  peer.say(masked_frame(Opcode::kText, "no JSON"));
   EXPECT_EQ(json::parse(peer.frame()->payload)["op"], "status");
-  peer.say(test::masked_frame(Opcode::kPing, "still there"));
+  peer.say(masked_frame(Opcode::kPing, "still there"));
   const auto pong = peer.frame();
   EXPECT_EQ(pong->opcode, Opcode::kPong);
   EXPECT_EQ(pong->payload, "still there");
@@ -190,7 +189,7 @@ TEST_F(LiveServerTest, SendsTheNewestStateTenTimesASecond) {
   (void)peer.frame();
   (void)peer.frame();
   peer.subscribe(1, 1);
-  peer.say(test::masked_frame(Opcode::kPing, ""));
+  peer.say(masked_frame(Opcode::kPing, ""));
   EXPECT_EQ(peer.frame()->opcode, Opcode::kPong) << "subscribed by now";
   for (int i = 1; i <= 1000; ++i) sut.show(1, i, "{}");
   int messages = 0;

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/platform/viewer/masked_frame.hpp"
-
 namespace roborun::viewer {
 namespace {
 
@@ -28,11 +26,11 @@ TEST(WebSocket, WritesTheThreeFormsOfALength) {
 }
 
 TEST(WebSocket, ReadsMessagesThatComeInAnyPieces) {
-  std::string stream = test::masked_frame(Opcode::kText, "Hello");
-  stream += test::masked_frame(Opcode::kText, std::string(300, 'a'), false);
-  stream += test::masked_frame(Opcode::kPing, "p");
-  stream += test::masked_frame(Opcode::kContinue, std::string(300, 'b'));
-  stream += test::masked_frame(Opcode::kBinary, "");
+  std::string stream = masked_frame(Opcode::kText, "Hello");
+  stream += masked_frame(Opcode::kText, std::string(300, 'a'), false);
+  stream += masked_frame(Opcode::kPing, "p");
+  stream += masked_frame(Opcode::kContinue, std::string(300, 'b'));
+  stream += masked_frame(Opcode::kBinary, "");
   for (const std::size_t step : {std::size_t{1}, std::size_t{7}, stream.size()}) {
     FrameReader sut;
     std::vector<FrameReader::Message> got;
@@ -55,9 +53,8 @@ TEST(WebSocket, ReadsMessagesThatComeInAnyPieces) {
 TEST(WebSocket, RefusesForEverWhatIsAgainstTheProtocol) {
   std::string too_long;
   for (int i = 0; i < 3; ++i)
-    too_long +=
-        test::masked_frame(i == 0 ? Opcode::kText : Opcode::kContinue, std::string(30000, 'x'), false);
-  const std::string good = test::masked_frame(Opcode::kText, "x");
+    too_long += masked_frame(i == 0 ? Opcode::kText : Opcode::kContinue, std::string(30000, 'x'), false);
+  const std::string good = masked_frame(Opcode::kText, "x");
   std::string unmasked = good;
   unmasked[1] = static_cast<char>(unmasked[1] & 0x7F);
   std::string reserved = good;
@@ -65,10 +62,10 @@ TEST(WebSocket, RefusesForEverWhatIsAgainstTheProtocol) {
   std::string huge = good;
   huge[1] = '\xFF';
   for (const std::string& bad :
-       {unmasked, reserved, huge, too_long, test::masked_frame(static_cast<Opcode>(3), "x"),
-        test::masked_frame(Opcode::kPing, "x", false),
-        test::masked_frame(Opcode::kPing, std::string(126, 'x')), test::masked_frame(Opcode::kContinue, "x"),
-        test::masked_frame(Opcode::kText, "x", false) + test::masked_frame(Opcode::kText, "x")}) {
+       {unmasked, reserved, huge, too_long, masked_frame(static_cast<Opcode>(3), "x"),
+        masked_frame(Opcode::kPing, "x", false), masked_frame(Opcode::kPing, std::string(126, 'x')),
+        masked_frame(Opcode::kContinue, "x"),
+        masked_frame(Opcode::kText, "x", false) + masked_frame(Opcode::kText, "x")}) {
     FrameReader sut;
     sut.feed(bad);
     FrameReader::Message message;

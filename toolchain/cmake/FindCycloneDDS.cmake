@@ -1,0 +1,12 @@
+# Cyclone DDS as CycloneDDS::ddsc, and its IDL compiler, which runs on this machine, as CycloneDDS_IDLC.
+find_path(CycloneDDS_INCLUDE_DIR dds/dds.h)
+find_library(CycloneDDS_LIBRARY ddsc)
+find_program(CycloneDDS_IDLC idlc)
+include(FindPackageHandleStandardArgs)
+find_package_handle_standard_args(CycloneDDS REQUIRED_VARS CycloneDDS_LIBRARY CycloneDDS_INCLUDE_DIR CycloneDDS_IDLC)
+if(CycloneDDS_FOUND AND NOT TARGET CycloneDDS::ddsc)
+  add_library(CycloneDDS::ddsc UNKNOWN IMPORTED)
+  set_target_properties(CycloneDDS::ddsc PROPERTIES
+    IMPORTED_LOCATION "${CycloneDDS_LIBRARY}"
+    INTERFACE_INCLUDE_DIRECTORIES "${CycloneDDS_INCLUDE_DIR}")
+endif()
