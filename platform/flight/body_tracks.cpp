@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
+#include "platform/flight/surface_middle.hpp"
 
 namespace roborun::flight {
 namespace {
@@ -17,6 +18,7 @@ constexpr double kGate_m = 1.2;
 constexpr double kGateGrows_mps = 1.5;
 constexpr double kPositionGain = 0.6;
 constexpr double kVelocityGain = 0.35;
+constexpr int kProbation = 8;     // sightings in which what appeared is followed though it has not moved
 constexpr double kBody_m = 0.9;   // around the place that was seen
 constexpr double kTouch_m = 0.6;  // the same without a reserve
 // What constant velocity is wrong by: more while it was estimated from few sightings.
@@ -74,15 +76,38 @@ void BodyTracks::observe(MonotonicTime now, std::span<const Vector3> places_W) n
       begin(place_W, now);
       continue;
     }
-    const double dt_s = seconds(now - track->seen);
-    const Vector3 expected_W = at_W(*track, now);
-    const Vector3 residual = place_W - expected_W;
-    const double gain = track->sightings == 1 ? 1.0 : kVelocityGain;
-    track->v_W = at_most(track->v_W + (gain / dt_s) * residual, kFastest_mps);
-    track->p_W = expected_W + (track->sightings == 1 ? 1.0 : kPositionGain) * residual;
-    track->seen = now;
-    ++track->sightings;
+    see(*track, place_W, now);
   }
+}
+
+void BodyTracks::see(Track& track, const Vector3& place_W, MonotonicTime now) noexcept {
+  const double dt_s = seconds(now - track.seen);
+  const Vector3 expected_W = at_W(track, now);
+  const Vector3 residual = place_W - expected_W;
+  const double gain = track.sightings == 1 ? 1.0 : kVelocityGain;
+  track.v_W = at_most(track.v_W + (gain / dt_s) * residual, kFastest_mps);
+  track.p_W = expected_W + (track.sightings == 1 ? 1.0 : kPositionGain) * residual;
+  track.seen = now;
+  ++track.sightings;
+}
+
+void BodyTracks::follow(MonotonicTime now, std::span<const stages::CloudPoint> points) noexcept {
+  for (Track& track : track_) {
+    const bool is_new = track.sightings > 0 && track.sightings < kProbation && now - track.seen <= kLasts;
+    if (track.seen >= now || !(is_new || is_sure(track, now))) continue;
+    const auto middle_W = surface_middle_W(at_W(track, now), points);
+    if (middle_W) see(track, *middle_W, now);
+  }
+}
+
+bool BodyTracks::near(MonotonicTime now, const Vector3& p_WB, const Vector3& v_WB,
+                      double reach_m) const noexcept {
+  constexpr double kStanding_mps = 0.5;
+  return std::any_of(track_.begin(), track_.end(), [&](const Track& track) {
+    const Vector3 way = at_W(track, now) - p_WB;
+    const bool behind = way.dot(v_WB) < 0.0 && v_WB.norm() > kStanding_mps;
+    return is_sure(track, now) && !behind && way.norm() < reach_m;
+  });
 }
 
 std::size_t BodyTracks::count(MonotonicTime now) const noexcept {

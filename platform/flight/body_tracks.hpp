@@ -9,6 +9,7 @@
 #include "core/geometry/vector.hpp"
 #include "core/trajectory.hpp"
 #include "firmware_if/time.hpp"
+#include "stages/perception/point_cloud.hpp"
 
 namespace roborun::flight {
 
@@ -23,8 +24,14 @@ class BodyTracks {
   /// Places of one decision where surfaces were seen in space known to be free, at this instant. Beyond `kMost` bodies the
   /// one that was not seen for longest is forgotten.
   void observe(MonotonicTime now, std::span<const Vector3> places_W) noexcept;
+  /// After observe(), with all surfaces of this decision: what appeared not long ago, or is known to move, is looked for
+  /// where it should be now. What is slow stays for long in cells that are not free, and appears once. O(tracks x points).
+  void follow(MonotonicTime now, std::span<const stages::CloudPoint> points) noexcept;
   /// Bodies whose motion is known at this instant.
   [[nodiscard]] std::size_t count(MonotonicTime now) const noexcept;
+  /// One of them is nearer than this, and not behind what flies here at this velocity.
+  [[nodiscard]] bool near(MonotonicTime now, const Vector3& p_WB, const Vector3& v_WB,
+                          double reach_m) const noexcept;
   struct Meeting {
     double near_s{kNever};   ///< When it first comes nearer to a body than both bounds allow.
     double touch_s{kNever};  ///< When both would touch, without bounds.
@@ -46,6 +53,8 @@ class BodyTracks {
     MonotonicTime seen{};
     int sightings{0};
   };
+  /// It was seen here now.
+  static void see(Track& track, const Vector3& place_W, MonotonicTime now) noexcept;
   /// Where it is at this instant.
   [[nodiscard]] static Vector3 at_W(const Track& track, MonotonicTime time) noexcept {
     return track.p_W + seconds(time - track.seen) * track.v_W;

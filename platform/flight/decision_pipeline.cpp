@@ -137,7 +137,8 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), need, budget, work);
   motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W}, cloud_.points(), map_.view(), budget, work);
   bodies_.observe(in.now, motion_.appeared_W());
-  out.motion = motion_.moving(in.now);
+  bodies_.follow(in.now, cloud_.points());
+  out.motion = motion_.moving(in.now) || bodies_.near(in.now, in.p_WB, in.v_WB, MotionWatch::kReach_m);
   // Where views leave gaps a coarse cell is rarely seen whole: in such cells nothing were visible, the governor would hurry,
   // choose coarser ones, and see as little again.
   const stages::FinestView finest(map_.view());

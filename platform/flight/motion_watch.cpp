@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "platform/flight/surface_middle.hpp"
 #include "stages/perception/polled_view.hpp"
 
 namespace roborun::flight {
@@ -47,7 +48,8 @@ void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> poi
   appeared_W_.clear();
   for (const Place& place : appeared) {
     if (place.points < kLeastPoints) continue;
-    (void)appeared_W_.push_back(place.sum_W / place.points);
+    const Vector3 seen_W = place.sum_W / place.points;
+    (void)appeared_W_.push_back(surface_middle_W(seen_W, points).value_or(seen_W));
     if (place.ahead < kLeastPoints) continue;
     moving_until_ = in.now + kMemory;
     trace_[next_trace_] = {place.p_W, in.now + kTraceMemory};

@@ -13,6 +13,11 @@ Vector3 clamp_norm(const Vector3& v, double limit) noexcept {
   return norm > limit ? Vector3(v * (limit / norm)) : v;
 }
 
+/// What holds against drag in still air: an integral alone would learn it after every change of speed.
+Vector3 drag_W_mps2(const VehicleModel& v, const Vector3& v_W) noexcept {
+  return (v.drag_linear_Nspm + v.drag_quadratic_Ns2pm2 * v_W.norm()) / v.mass_kg * v_W;
+}
+
 }  // namespace
 
 Tracker::Config Tracker::config_for(const VehicleModel& vehicle, double period_s) noexcept {
@@ -38,7 +43,8 @@ Vector3 Tracker::acceleration_W(const Input& in) noexcept {
   integral_W_mps2_ =
       clamp_norm(integral_W_mps2_ + config_.velocity_integral_Hz2 * config_.period_s * error_W_mps,
                  config_.integral_limit_mps2);
-  Vector3 a_W = in.reference.a_W + config_.velocity_gain_Hz * error_W_mps + integral_W_mps2_;
+  Vector3 a_W = in.reference.a_W + drag_W_mps2(config_.vehicle, in.reference.v_W) +
+                config_.velocity_gain_Hz * error_W_mps + integral_W_mps2_;
   // Never ask for less than half of hover thrust: attitude needs something to work with.
   a_W.z() = std::clamp(a_W.z(), -0.5 * core::kGravity_mps2, 0.6 * core::kGravity_mps2);
   const core::SinCos tilt = core::sin_cos(config_.vehicle.tilt_rad);

@@ -35,6 +35,8 @@ Vector3 vector_of(const std::array<double, 3>& v) noexcept { return {v[0], v[1],
 stages::Tracker::Config tracker_config(AutopilotKind kind, const VehicleModel& vehicle,
                                        Nanos frame) noexcept {
   stages::Tracker::Config config = stages::Tracker::config_for(vehicle, seconds(frame));
+  // Neither of them knows its drag.
+  config.vehicle.drag_linear_Nspm = config.vehicle.drag_quadratic_Ns2pm2 = 0.0;
   if (kind == AutopilotKind::kPx4) {
     config.position_gain_Hz = 0.95;
     config.velocity_gain_Hz = 1.8;

@@ -93,6 +93,40 @@ TEST(BodyTracks, BoundsGrowWithTimeUnseenAndTracksEnd) {
   EXPECT_EQ(sut.count(at_s(4.1)), 0U) << "two seconds without being seen";
 }
 
+/// What is seen of a body: nine points, the middle of which lies 0.3 m behind what came into free space first.
+std::array<stages::CloudPoint, 9> surface(const Vector3& p_W) {
+  std::array<stages::CloudPoint, 9> points;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    points[i] = {p_W + Vector3(0.0, 0.15 * static_cast<double>(i) - 0.9, 0.0), 1};
+  return points;
+}
+
+/// At 1 m/s along y, past (10, 0) after 5 s. It appears in free space for a second, then stays in cells that are not free.
+Vector3 slow_W(double time_s) { return {10.0, -5.0 + time_s, 3.0}; }
+
+TEST(BodyTracks, FollowWhatIsSlowThroughCellsThatAreNotFree) {
+  BodyTracks sut;
+  double t = 0.0;
+  for (; t <= 1.0; t += 0.2) see(sut, t, slow_W(t));
+  ASSERT_EQ(sut.count(at_s(1.0)), 1U);
+  for (; t <= 5.0; t += 0.2) sut.follow(at_s(t), surface(slow_W(t)));
+  ASSERT_EQ(sut.count(at_s(t)), 1U);
+  // At 2 m/s it would be in front of (10, 0) after 5 s, too; the body is there until about 6 s.
+  EXPECT_LT(sut.meets(straight(0.0, 2.0), at_s(4.0), kPlanned_m, kOwn_m).touch_s, 1.2);
+  EXPECT_TRUE(sut.near(at_s(5.0), {5, 0, 3}, {1, 0, 0}, 15.0));
+  EXPECT_FALSE(sut.near(at_s(5.0), {5, 0, 3}, {1, 0, 0}, 4.0)) << "too far";
+  EXPECT_FALSE(sut.near(at_s(5.0), {15, 0, 3}, {1, 0, 0}, 15.0)) << "behind";
+}
+
+TEST(BodyTracks, DoNotFollowWhatStands) {
+  BodyTracks sut = crossing_until(1.0);
+  ASSERT_EQ(sut.count(at_s(1.0)), 1U);
+  const auto wall = surface(crosser_W(1.2));
+  for (double t = 1.2; t <= 3.0; t += 0.2) sut.follow(at_s(t), wall);
+  EXPECT_EQ(sut.count(at_s(3.0)), 0U);
+  EXPECT_FALSE(sut.near(at_s(3.0), {5, 0, 3}, {1, 0, 0}, 15.0));
+}
+
 TEST(BodyTracks, FollowManyAtOnceAndForgetTheOldest) {
   BodyTracks sut;
   for (double t = 0.0; t < 1.01; t += 0.2) {
@@ -101,6 +135,7 @@ TEST(BodyTracks, FollowManyAtOnceAndForgetTheOldest) {
       places_W[i] = Vector3(8.0 * static_cast<double>(i), 1.5 * t, 3.0);
     const test::NoAllocScope scope;
     sut.observe(at_s(t), places_W);
+    sut.follow(at_s(t), {});
     (void)sut.meets(straight(0.0, 2.0), at_s(t), kPlanned_m, kOwn_m);
     EXPECT_EQ(scope.count(), 0U);
   }

@@ -34,6 +34,21 @@ TEST(Tracker, LeansTowardsAReferenceAhead) {
   EXPECT_GT(r[2] + r[3], r[0] + r[1]) << "rear motors push the nose down";
 }
 
+TEST(Tracker, LeansAgainstTheDragOfItsReference) {
+  Tracker::Input in;
+  in.state.v_WB = in.reference.v_W = Vector3(6.0, 0.0, 0.0);
+  firmware_if::MotorCommand command;
+  const auto& r = command.thrust_ratio;
+  Tracker sut({});
+  ASSERT_EQ(sut.step(in, command), Status::kOk);
+  EXPECT_GT(r[2] + r[3], r[0] + r[1]);
+  Tracker::Config config;
+  config.vehicle.drag_linear_Nspm = config.vehicle.drag_quadratic_Ns2pm2 = 0.0;
+  Tracker without(config);
+  ASSERT_EQ(without.step(in, command), Status::kOk);
+  EXPECT_NEAR(r[2] + r[3], r[0] + r[1], 1e-9) << "nothing to correct";
+}
+
 TEST(Tracker, TheIntegralStopsAtItsLimitAndForgets) {
   Tracker::Config config;
   Tracker tracker(config);

@@ -67,7 +67,7 @@ TEST(ClosedLoop, SlowFlightStaysNearerToItsReferenceBesideWhatItSaw) {
   RecordProperty("worst_at_6_mps_m", std::to_string(fast_m));
   EXPECT_LT(slow_m, 0.1);
   EXPECT_GT(fast_m, slow_m);
-  EXPECT_LT(fast_m, VehicleModel{}.tracking_error_m);
+  EXPECT_LT(fast_m, 0.15) << "0.22 where the integral alone holds against drag";
 }
 
 /// 6 m/s in a mean wind of 5 m/s from all sides, with gusts of 1.5 m/s (one sigma: a turbulence of 30 %).
