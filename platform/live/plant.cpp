@@ -11,6 +11,7 @@
 #include <cmath>
 #include <memory>
 #include <thread>
+#include <utility>
 
 #include "core/exchange/spsc_ring.hpp"
 #include "platform/flight/goal_queue.hpp"
@@ -104,13 +105,15 @@ class Plant {
   flight::FlightConfig flight_;
   rt::MonotonicClock clock_;
   sensor_port::VehiclePorts names_;
+  // What may be refused, before any port is made.
+  std::unique_ptr<can::SocketCan> kernel_;  ///< Null: the bus is made of ports, or there is none.
+  std::unique_ptr<PhysicsLink> physics_;    ///< Null: this machine's clock steps the world.
   PictureThread pictures_;
   TruthPort truth_;
   sitl::SimulatedAircraft aircraft_;
   sitl::SimulatedPlant& plant_{aircraft_.plant()};
-  std::unique_ptr<PhysicsLink> physics_;  ///< Null: this machine's clock steps the world.
-  std::unique_ptr<PlantSide> side_;       ///< Null: there is physics_.
-  Nanos held_{0};                         ///< So much later is it than in the world, which stood still.
+  std::unique_ptr<PlantSide> side_;  ///< Null: there is physics_.
+  Nanos held_{0};                    ///< So much later is it than in the world, which stood still.
   MonotonicTime start_{}, listened_{}, heard_{};
   std::optional<MonotonicTime> first_word_;
   std::uint64_t frame_{0}, stalls_{0};
@@ -127,16 +130,17 @@ Plant::Plant(const sitl::World& world, const PlantConfig& config)
       config_(config),
       flight_(mission::flight_config_of(world, config.mission)),
       names_(config.port),
+      kernel_(kernel_bus(config.on_bus)),
+      physics_(config.physics ? physics_link(*config.physics, config.origin) : nullptr),
       pictures_(world, config),
       truth_(names_),
       aircraft_(flight_.vehicle, config.mission.simulator, mission::ground_below(world), config.mission.seed,
                 flight_.minor_frame, pictures_),
-      physics_(config.physics ? physics_link(*config.physics, config.origin) : nullptr),
       side_(config.physics     ? nullptr
             : config.autopilot ? autopilot_side(aircraft_, flight_.vehicle, flight_.minor_frame,
                                                 *config.autopilot, config.origin)
                                : port_side(aircraft_, sitl::rig_of(config.mission.simulator), names_,
-                                           config.origin, config.on_bus)) {
+                                           config.origin, config.on_bus, std::move(kernel_))) {
   plant_.stand_in(world);
 }
 

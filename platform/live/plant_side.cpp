@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
-#include "platform/can/socket_can.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/live/plant_bus.hpp"
 #include "platform/live/plant_ports.hpp"
@@ -19,14 +19,14 @@ namespace {
 class PortSide final : public PlantSide {
  public:
   PortSide(sitl::SimulatedPlant& plant, const SensorRig& rig, const sensor_port::VehiclePorts& names,
-           const sensor_port::EarthPlace& origin, const std::optional<PlantBus>& on_bus)
-      : plant_(plant), bus_out_(names.bus_out()), navigation_(rig, names, origin, on_bus.has_value()) {
+           const sensor_port::EarthPlace& origin, const std::optional<PlantBus>& on_bus,
+           std::unique_ptr<can::SocketCan> kernel)
+      : plant_(plant),
+        bus_out_(names.bus_out()),
+        navigation_(rig, names, origin, on_bus.has_value()),
+        kernel_(std::move(kernel)) {
     if (on_bus) nodes_.emplace(plant.far_side().spare_bus(), origin);
-    if (on_bus && !on_bus->interface.empty()) {
-      if (const std::string wrong = kernel_.emplace().open(on_bus->interface); !wrong.empty())
-        throw InputError("--can: " + wrong);
-      return;
-    }
+    if (kernel_) return;
     const std::string wrong = bus_.speak(names.bus_in(), {});
     if (!wrong.empty()) throw InputError(fmt::format("{}: {}", names.bus_in(), wrong));
   }
@@ -111,8 +111,8 @@ class PortSide final : public PlantSide {
   std::string bus_out_;
   NavigationPorts navigation_;
   sensor_port::PortCan bus_;
-  std::optional<can::SocketCan> kernel_;  ///< Instead of bus_.
-  std::optional<SensorNodes> nodes_;      ///< None: the sensors are ports.
+  std::unique_ptr<can::SocketCan> kernel_;  ///< Instead of bus_; may be null.
+  std::optional<SensorNodes> nodes_;        ///< None: the sensors are ports.
   PlantOperator operator_;
   Nanos shift_{0};
   bool listens_{false};
@@ -195,11 +195,20 @@ class AutopilotSide final : public PlantSide {
 
 }  // namespace
 
+std::unique_ptr<can::SocketCan> kernel_bus(const std::optional<PlantBus>& on_bus) {
+  if (!on_bus || on_bus->interface.empty()) return nullptr;
+  auto kernel = std::make_unique<can::SocketCan>();
+  if (const std::string wrong = kernel->open(on_bus->interface); !wrong.empty())
+    throw InputError("--can: " + wrong);
+  return kernel;
+}
+
 std::unique_ptr<PlantSide> port_side(sitl::SimulatedAircraft& body, const SensorRig& rig,
                                      const sensor_port::VehiclePorts& names,
                                      const sensor_port::EarthPlace& origin,
-                                     const std::optional<PlantBus>& on_bus) {
-  return std::make_unique<PortSide>(body.plant(), rig, names, origin, on_bus);
+                                     const std::optional<PlantBus>& on_bus,
+                                     std::unique_ptr<can::SocketCan> kernel) {
+  return std::make_unique<PortSide>(body.plant(), rig, names, origin, on_bus, std::move(kernel));
 }
 
 std::unique_ptr<PlantSide> autopilot_side(sitl::SimulatedAircraft& body, const VehicleModel& vehicle,

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/sensor_rig.hpp"
+#include "platform/can/socket_can.hpp"
 #include "platform/mavlink/link.hpp"
 #include "platform/mavlink/signed_end.hpp"
 #include "platform/mission/autopilot_choice.hpp"
@@ -54,11 +55,14 @@ struct PlantBus {
   std::string interface;  ///< Of the kernel; empty: the bus is made of ports.
 };
 
-/// Ports of `names`; the world's origin is at `origin`. `body` outlives it. Throws InputError.
+/// The interface of the kernel that `on_bus` names; null: none. Before any port is made: what is refused leaves none. Throws InputError.
+[[nodiscard]] std::unique_ptr<can::SocketCan> kernel_bus(const std::optional<PlantBus>& on_bus);
+/// Ports of `names`; the world's origin is at `origin`. `kernel`: of kernel_bus(). `body` outlives it. Throws InputError.
 [[nodiscard]] std::unique_ptr<PlantSide> port_side(sitl::SimulatedAircraft& body, const SensorRig& rig,
                                                    const sensor_port::VehiclePorts& names,
                                                    const sensor_port::EarthPlace& origin,
-                                                   const std::optional<PlantBus>& on_bus);
+                                                   const std::optional<PlantBus>& on_bus,
+                                                   std::unique_ptr<can::SocketCan> kernel);
 /// A fake autopilot, which steps `body`'s motors.
 [[nodiscard]] std::unique_ptr<PlantSide> autopilot_side(sitl::SimulatedAircraft& body,
                                                         const VehicleModel& vehicle, Nanos minor_frame,
