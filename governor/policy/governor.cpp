@@ -97,8 +97,9 @@ Status GovernorConfig::validate() const noexcept {
   return ok ? Status::kOk : Status::kInvalidArgument;
 }
 
-Governor::Governor(const GovernorConfig& config) noexcept : config_(config) {
+void Governor::configure(const GovernorConfig& config) noexcept {
   ROBORUN_ASSERT(config.validate() == Status::kOk);
+  config_ = config;
   switch (config.design) {
     case Design::kAware:
       v_max_mps_ = config.v_max_mps;

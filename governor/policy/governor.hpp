@@ -80,7 +80,9 @@ struct GovernorConfig {
 class Governor final : public DecisionPolicy {
  public:
   /// Precondition, asserted: config.validate() is kOk.
-  explicit Governor(const GovernorConfig& config) noexcept;
+  explicit Governor(const GovernorConfig& config) noexcept { configure(config); }
+  /// From the next decision on by these limits; what it has learnt of the stages' times stays. The same precondition.
+  void configure(const GovernorConfig& config) noexcept;
 
   [[nodiscard]] Decision decide(const SpaceProfile& profile, const Situation& situation) noexcept override;
   void observe(core::StageId id, double predicted_s, double spent_s) noexcept override;

@@ -47,6 +47,7 @@ class Row {
 /// The texts of the entry are those of the row.
 log::DecisionEntry entry_of(const Row& r) {
   log::DecisionEntry e;
+  e.time_ns = from_seconds(r.number("time_s")).count();
   e.budget_source = r.text("budget_source").c_str();
   e.solver = r.text("solver").c_str();
   e.ways = r.text("ways").c_str();
@@ -55,6 +56,11 @@ log::DecisionEntry entry_of(const Row& r) {
   e.active.append(r.text("active"));
   e.refused.append(r.text("refused"));
   const std::initializer_list<std::pair<const char*, double*>> numbers{
+      {"x_m", e.p_WB.data()},
+      {"y_m", &e.p_WB[1]},
+      {"z_m", &e.p_WB[2]},
+      {"speed_mps", &e.speed_mps},
+      {"latency_s", &e.latency_s},
       {"time_budget_s", &e.time_budget_s},
       {"deadline_s", &e.deadline_s},
       {"p0_m", &e.p0_m},
@@ -71,10 +77,33 @@ log::DecisionEntry entry_of(const Row& r) {
       {"speed_limit_mps", &e.speed_limit_mps}};
   for (const auto& [key, value] : numbers) *value = r.number(key);
   if (r.text("ways") == "ok") e.way_m = r.number("way_m");
+  for (std::size_t i = 0; i < core::kStageCount; ++i) {
+    const char* stage = core::to_string(static_cast<core::StageId>(i));
+    e.predicted_s[i] = r.number(fmt::format("{}_predicted_s", stage));
+    e.stage_s[i] = r.number(fmt::format("{}_s", stage));
+  }
+  e.missed = r.text("missed") == "1";
   return e;
 }
 
 }  // namespace
+
+std::string text_of_decision(const log::DecisionEntry& e, std::size_t number, std::string_view design) {
+  std::string text =
+      fmt::format("Decision {} of {}, at {:.2f} s: at ({:.1f}, {:.1f}, {:.1f}) m, flying {:.1f} m/s.\n\n",
+                  number, design, seconds(Nanos{e.time_ns}), e.p_WB[0], e.p_WB[1], e.p_WB[2], e.speed_mps);
+  for (const std::string& one : log::why_of(e)) text += one + "\n";
+  text += "\n";
+  text += fmt::format("{:<14} {:>12} {:>9}\n", "stage", "predicted s", "spent s");
+  for (std::size_t i = 0; i < core::kStageCount; ++i)
+    text += fmt::format("{:<14} {:>12.4f} {:>9.4f}\n", core::to_string(static_cast<core::StageId>(i)),
+                        e.predicted_s[i], e.stage_s[i]);
+  text += fmt::format("{:<14} {:>12} {:>9.4f}   {}\n\n", "all", "", e.latency_s,
+                      e.missed ? "LATE: the vehicle is on its braking tail" : "in time");
+  const std::vector<std::string> outcome = log::outcome_of(e);
+  for (const std::string& one : outcome) text += (&one == &outcome.back() ? "\n" : "") + one + "\n";
+  return text;
+}
 
 std::string explain_decision(const std::string& name, const std::string& csv, double at_s,
                              const std::string& design) {
@@ -120,24 +149,7 @@ std::string explain_decision(const std::string& name, const std::string& csv, do
         fmt::format("--at: {} s is outside the trace: must be {:.2f} to {:.2f}", at_s, first_s, last_s));
 
   const Row r(column, std::move(found));
-  std::string text =
-      fmt::format("Decision {} of {}, at {:.2f} s: at ({:.1f}, {:.1f}, {:.1f}) m, flying {:.1f} m/s.\n\n",
-                  number, r.text("design"), r.number("time_s"), r.number("x_m"), r.number("y_m"),
-                  r.number("z_m"), r.number("speed_mps"));
-  const log::DecisionEntry entry = entry_of(r);
-  for (const std::string& one : log::why_of(entry)) text += one + "\n";
-  text += "\n";
-  text += fmt::format("{:<14} {:>12} {:>9}\n", "stage", "predicted s", "spent s");
-  for (std::size_t i = 0; i < core::kStageCount; ++i) {
-    const char* stage = core::to_string(static_cast<core::StageId>(i));
-    text += fmt::format("{:<14} {:>12.4f} {:>9.4f}\n", stage, r.number(fmt::format("{}_predicted_s", stage)),
-                        r.number(fmt::format("{}_s", stage)));
-  }
-  text += fmt::format("{:<14} {:>12} {:>9.4f}   {}\n\n", "all", "", r.number("latency_s"),
-                      r.text("missed") == "1" ? "LATE: the vehicle is on its braking tail" : "in time");
-  const std::vector<std::string> outcome = log::outcome_of(entry);
-  for (const std::string& one : outcome) text += (&one == &outcome.back() ? "\n" : "") + one + "\n";
-  return text;
+  return text_of_decision(entry_of(r), number, r.text("design"));
 }
 
 void add_explain_command(CLI::App& app, std::function<int()>& run) {

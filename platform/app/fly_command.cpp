@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "platform/app/exit_code.hpp"
+#include "platform/app/flight_source.hpp"
 #include "platform/app/options.hpp"
 #include "platform/app/plan_argument.hpp"
 #include "platform/app/world_arguments.hpp"
@@ -37,20 +38,15 @@ namespace roborun::app {
 namespace {
 
 struct FlyOptions {
-  std::string env{"14"};
-  std::string mission{"package_delivery"};
+  FlightSource source;
   std::string design{"aware"};
   std::string profile{"paper"};
   std::string seed{"1"};
   std::string map{"own"};
   std::string planner{"own"};
   std::string ways{"own"};
-  std::string world;
-  WorldArguments in_file;
-  std::string vehicle{"paper"};
   std::string autopilot{"none"};
   std::string plan;
-  std::string settings;
   std::string host_file;
   double host_factor{1.0};
   std::string log;
@@ -122,7 +118,6 @@ int fly(const FlyOptions& options) {
   std::vector<governor::Design> designs;
   for (const std::string& name : input::split(options.design))
     designs.push_back(mission::design_of("--design", name));
-  const sitl::Mission mission = sitl::mission_of(options.mission);
   const auto autopilot = mission::autopilot_of("--autopilot", options.autopilot);
   const std::uint64_t seed = input::seed_of("--seed", options.seed);
   const auto colour =
@@ -134,46 +129,24 @@ int fly(const FlyOptions& options) {
                                  fmt::join(report::kPathColourName, ", ")));
   if (!options.log.empty() && designs.size() != 1)
     throw InputError("--log: one flight per file: must go with one --design");
-  mission::MissionConfig config;
-  const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.vehicle);
-  mission::set_vehicle(config, vehicle);
-  std::vector<std::string> inputs = vehicle.patterns;
-  for (const std::string& path :
-       {options.vehicle, options.world, options.settings, options.profile, options.plan})
-    inputs.push_back(path);
+  PreparedFlight flight = prepare(options.source, seed);
+  mission::MissionConfig& config = flight.config;
+  const sitl::World& world = *flight.world;
+  std::vector<std::string> inputs = flight.inputs;
+  for (const std::string& path : {options.profile, options.plan}) inputs.push_back(path);
   if (options.profile == "host") inputs.push_back(host_file_of(options));
   for (const std::string& name : {options.map, options.planner, options.ways})
     inputs.push_back(name.substr(name.find(':') + 1));  // of a plugin
   input::check_outputs({{"--log", options.log}, {"--trace", options.trace}, {"--plot", options.plot}},
                        inputs);
-  if (!options.settings.empty()) mission::load_settings(options.settings, config);
-  std::string env;
-  std::string title;
-  double zone_m = 0.0;
-  std::unique_ptr<sitl::World> world;
-  if (!options.world.empty()) {
-    world = std::make_unique<sitl::World>(
-        sitl::load_world(options.world, world_options(options.in_file, config.flight.vehicle.radius_m)));
-    if (const std::vector<Vector3> goals_W = goals_of(options.in_file); goals_W.size() > 1)
-      config.goals.push_back({0.0, goals_W});
-    env = options.world;
-    title = fmt::format("{}, seed {}", options.world, seed);
-  } else {
-    if (any_given(options.in_file))
-      throw InputError("--start, --goal and the like go with --world FILE: the environments have their own");
-    const sitl::NamedEnvironment named = sitl::environment(options.env);
-    world = std::make_unique<sitl::World>(sitl::generate(named.knobs, mission, seed));
-    env = fmt::format("{}", named.number);
-    zone_m = named.knobs.spread_m;
-    title = fmt::format("Environment {} ({}), {}, seed {}", named.number, named.name, options.mission, seed);
-  }
   if (!options.plan.empty() && !config.goals.empty()) throw InputError("--goal, --plan: must be one of both");
   if (autopilot) config.autopilot = mission::AutopilotChoice{*autopilot, options.tune};
   if (!options.plan.empty()) take_plan(options.plan, config);
-  for (const std::string& line : mission::beyond_reach(*world, config))
+  for (const std::string& line : mission::beyond_reach(world, config))
     fmt::print(stderr, "roborun: {}\n", line);
   const board::Profile profile = profile_of(options);
-  if (options.vehicle != "paper") title += fmt::format(", vehicle {}", options.vehicle);
+  std::string title = flight.title;
+  if (options.source.vehicle != "paper") title += fmt::format(", vehicle {}", options.source.vehicle);
   title += fmt::format(", cost profile {}", options.profile);
 
   if (options.tune && !autopilot)
@@ -187,7 +160,6 @@ int fly(const FlyOptions& options) {
     config.host_factor = options.host_factor;
   else
     config.host_costs = board::known_host_costs({options.map, options.planner});
-  config.seed = seed;
   config.keep_known = known;
   config.log = options.log;
   config.backends.map = options.map;
@@ -205,18 +177,18 @@ int fly(const FlyOptions& options) {
       throw input::Interrupted(
           fmt::format("{} after {:.0f} s of flight, {:.0f} m from the goal; {} of {} designs flown; {}",
                       governor::to_string(design), seconds(frame.now.time_since_epoch()),
-                      (world->goal_W() - frame.truth.p_WB).norm(), reports.size(), designs.size(),
+                      (world.goal_W() - frame.truth.p_WB).norm(), reports.size(), designs.size(),
                       options.log.empty() ? "no file was written" : "the log ends there"));
     };
-    reports.push_back(mission::fly_mission(*world, config, [&line, design](const mission::Progress& p) {
+    reports.push_back(mission::fly_mission(world, config, [&line, design](const mission::Progress& p) {
       if (!line.due()) return;
       line.show(fmt::format("{:<12} {:3.0f} % of the way, {:6.0f} s flown, {:4.1f} m/s, {:3.0f} x real time",
                             governor::to_string(design), 100.0 * p.done_ratio, p.time_s, p.speed_mps,
                             p.time_s / line.elapsed_s()));
     }));
     report::MissionResult& result = reports.back().result;
-    result.env = env;
-    result.mission = options.world.empty() ? options.mission : "world_file";
+    result.env = flight.env;
+    result.mission = options.source.world.empty() ? options.source.mission : "world_file";
     all_reached = all_reached && result.reached_goal && !result.collided;
     result.believed = believes(options, reports.back());
     all_believed = all_believed && result.believed;
@@ -241,7 +213,7 @@ int fly(const FlyOptions& options) {
   }
   if (!options.trace.empty()) input::write_file(options.trace, report::trace_csv(reports));
   if (!options.plot.empty()) {
-    const report::Scene scene = mission::scene_of(*world, title, zone_m);
+    const report::Scene scene = mission::scene_of(world, title, flight.zone_m);
     const auto by = static_cast<report::PathColour>(colour - report::kPathColourName.begin());
     input::write_file(options.plot, known  ? report::known_svg(scene, reports)
                                     : maps ? report::maps_svg(scene, reports)
@@ -272,11 +244,11 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
       "Exit code: 0 every design reached the goal, 1 at least one did not (the table says why), or a plugin "
       "took more\ntime than the work that it counts is worth, 2 bad input.");
   CLI::Option* env = fly_app
-                         ->add_option("--env", options->env,
+                         ->add_option("--env", options->source.env,
                                       "Environment: 1 .. 27, or a name like density0.45-spread80-distance900")
                          ->capture_default_str();
   CLI::Option* mission =
-      fly_app->add_option("--mission", options->mission, "package_delivery or search_and_rescue")
+      fly_app->add_option("--mission", options->source.mission, "package_delivery or search_and_rescue")
           ->capture_default_str();
   fly_app
       ->add_option("--design", options->design,
@@ -307,14 +279,14 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
       ->capture_default_str();
   fly_app
       ->add_option(
-          "--world", options->world,
+          "--world", options->source.world,
           "World from a file instead: .toml, OctoMap .bt / .ot, SDF .world / .sdf, points .pcd / .ply "
           "/ .las, meshes .stl / .obj / .dae")
       ->excludes(env)
       ->excludes(mission);
-  add_world_arguments(*fly_app, options->in_file);
+  add_world_arguments(*fly_app, options->source.in_file);
   fly_app
-      ->add_option("--vehicle", options->vehicle,
+      ->add_option("--vehicle", options->source.vehicle,
                    "Vehicle: a shipped one (roborun vehicle list), or a vehicle file")
       ->capture_default_str();
   fly_app->add_option("--plan", options->plan,
@@ -331,7 +303,7 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
       "--autopilot-tune", options->tune,
       "Set the autopilot's limits of acceleration and jerk to the vehicle's before the take-off; default: "
       "the plans keep to its own");
-  fly_app->add_option("--settings", options->settings,
+  fly_app->add_option("--settings", options->source.settings,
                       "Cameras, wind, battery, speed from a TOML file (see platform/README.md)");
   fly_app->add_option(
       "--log", options->log,

@@ -2,23 +2,33 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "platform/app/exit_code.hpp"
+#include "platform/app/options.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/output_file.hpp"
+#include "platform/input/stop_signal.hpp"
 #include "platform/input/text_file.hpp"
+#include "platform/mission/flight_end.hpp"
 #include "platform/mission/flight_story.hpp"
 #include "platform/mission/scene.hpp"
+#include "platform/report/folder_page.hpp"
+#include "platform/report/result_line.hpp"
 #include "platform/sitl/world/generator.hpp"
 #include "platform/sitl/world/world_file.hpp"
 
 namespace roborun::app {
 namespace {
+
+namespace fs = std::filesystem;
 
 struct ReportOptions {
   std::string log;
@@ -43,16 +53,122 @@ mission::WorldOf world_of(const ReportOptions& options) {
   };
 }
 
+void print_page(const std::string& path, const std::string& html) {
+  input::write_file(path, html);
+  fmt::print("page: {} ({:.2f} MB)\n", path, 1e-6 * static_cast<double>(html.size()));
+}
+
+report::FolderRow row_of(const std::string& name, const mission::FlightEnd& end) {
+  using Verdict = report::FolderRow::Verdict;
+  return {name,
+          "",
+          end.good()       ? Verdict::kReached
+          : end.has_result ? Verdict::kFailed
+                           : Verdict::kUnknown,
+          end.reason,
+          end.damage,
+          end.has_result ? end.time_s : end.recorded_s,
+          end.mean_mps,
+          end.closest_m};
+}
+
+report::FolderRow row_of(const report::MissionResult& r) {
+  using Verdict = report::FolderRow::Verdict;
+  const std::string env = r.env.find_first_not_of("0123456789") == std::string::npos ? "env " + r.env : r.env;
+  return {fmt::format("{} {} {} seed {}", env, r.profile, r.design, r.seed),
+          "",
+          r.reached_goal && !r.collided ? Verdict::kReached : Verdict::kFailed,
+          r.reason,
+          "",
+          r.mission_time_s,
+          r.mean_velocity_mps,
+          mission::kUnknown};
+}
+
+/// One row per line of results; a line that is none is named.
+void add_results(const fs::path& path, std::vector<report::FolderRow>& rows,
+                 std::vector<std::string>& skipped) {
+  std::istringstream lines(input::read_text(path.string(), "lines of results"));
+  std::size_t number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    if (const auto result = report::from_line(line))
+      rows.push_back(row_of(*result));
+    else
+      skipped.push_back(fmt::format("{}:{}: no result of a flight", path.string(), number));
+  }
+}
+
+/// The files of a folder that may hold flights, by name.
+struct FolderFiles {
+  std::vector<fs::path> logs, results;
+};
+
+FolderFiles files_in(const std::string& folder) {
+  FolderFiles files;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    if (at->path().extension() == ".mcap") files.logs.push_back(at->path());
+    if (at->path().extension() == ".jsonl") files.results.push_back(at->path());
+  }
+  if (error) throw InputError(fmt::format("{}: cannot be read: {}", folder, error.message()));
+  std::sort(files.logs.begin(), files.logs.end());
+  std::sort(files.results.begin(), files.results.end());
+  if (files.logs.empty() && files.results.empty())
+    throw InputError(fmt::format(
+        "{}: holds no flights: must hold logs (.mcap) or results of roborun sweep (.jsonl)", folder));
+  return files;
+}
+
+int report_folder(const ReportOptions& options) {
+  const FolderFiles files = files_in(options.log);
+  const std::string out = options.out.empty() ? (fs::path(options.log) / "index.html").string() : options.out;
+  const auto page_of = [](fs::path log) { return log.replace_extension(".html"); };
+  std::vector<input::NamedOutput> outputs{{"-o", out}};
+  std::vector<std::string> inputs;
+  for (const fs::path& log : files.logs) {
+    outputs.push_back({"report", page_of(log).string()});
+    inputs.push_back(log.string());
+  }
+  for (const fs::path& results : files.results) inputs.push_back(results.string());
+  input::check_outputs(outputs, inputs);
+  std::vector<report::FolderRow> rows;
+  std::vector<std::string> skipped;
+  const input::StopOnSignal stop;
+  for (const fs::path& log : files.logs) {
+    if (input::StopOnSignal::requested())
+      throw input::Interrupted(fmt::format("{} of {} pages written", rows.size(), files.logs.size()));
+    std::string html;
+    report::FolderRow row;
+    try {
+      row = row_of(log.stem().string(), mission::end_of(log.string()));
+      html = report::flight_page_html(mission::story_of(log.string()).page);
+    } catch (const InputError& error) {
+      skipped.emplace_back(error.what());
+      continue;
+    }
+    print_page(page_of(log).string(), html);
+    row.page = fs::relative(page_of(log), fs::absolute(out).parent_path()).string();
+    rows.push_back(std::move(row));
+  }
+  for (const fs::path& results : files.results) add_results(results, rows, skipped);
+  for (const std::string& line : skipped) fmt::print(stderr, "roborun: left out: {}\n", line);
+  if (rows.empty()) throw InputError(fmt::format("{}: none of its files holds a flight", options.log));
+  const std::size_t count = rows.size();
+  input::write_file(out, report::folder_page_html(options.log, std::move(rows), skipped));
+  fmt::print("index: {} ({} flights)\n", out, count);
+  return kDone;
+}
+
 int report(const ReportOptions& options) {
+  if (std::error_code error; fs::is_directory(options.log, error)) return report_folder(options);
   const std::string out = options.out.empty()
                               ? std::filesystem::path(options.log).replace_extension(".html").string()
                               : options.out;
   input::check_outputs({{"-o", out}}, {options.log, options.world});
   const mission::FlightStory story = mission::story_of(options.log, world_of(options));
   if (!story.damage.empty()) fmt::print(stderr, "roborun: {}; the page goes until there\n", story.damage);
-  const std::string html = report::flight_page_html(story.page);
-  input::write_file(out, html);
-  fmt::print("page: {} ({:.2f} MB)\n", out, 1e-6 * static_cast<double>(html.size()));
+  print_page(out, report::flight_page_html(story.page));
   return kDone;
 }
 
@@ -63,15 +179,23 @@ void add_report_command(CLI::App& app, std::function<int()>& run) {
   CLI::App* command =
       app.add_subcommand("report", "Make one offline page of a flight log: view in space, charts, reasons");
   command->footer(
-      "Example:\n"
-      "  roborun fly --log flight.mcap && roborun report flight.mcap -o flight.html\n\n"
+      "Examples:\n"
+      "  roborun fly --log flight.mcap && roborun report flight.mcap -o flight.html\n"
+      "  roborun scenario run scenarios --out failed; roborun report failed     a table of all that "
+      "failed\n\n"
       "The page needs a browser of 2023 or newer, and no network. Arrow keys go from decision to decision, "
       "with shift\n"
       "10 s; a click on a chart chooses a moment. A log that was cut gives a page until the cut, and a line "
       "that says so.\n\n"
+      "In a folder what is damaged, or holds no flight, is named and left out.\n\n"
       "Exit code: 0 the page was written, 2 bad input.");
-  command->add_option("log", options->log, "What --log FILE.mcap wrote")->required();
-  command->add_option("-o,--out", options->out, "The page [LOG with the ending .html]");
+  command
+      ->add_option("log", options->log,
+                   "What --log FILE.mcap wrote; or a folder: a table of its logs and of the results of a "
+                   "sweep, and a page "
+                   "beside each log")
+      ->required();
+  command->add_option("-o,--out", options->out, "The page [LOG with the ending .html; FOLDER/index.html]");
   CLI::Option* world = command->add_option(
       "--world", options->world,
       "Draw what truly stands there, where the log does not hold it: the flight's world file");
@@ -80,7 +204,13 @@ void add_report_command(CLI::App& app, std::function<int()>& run) {
   command->add_option("--mission", options->mission, "With --env: the mission that was flown")
       ->capture_default_str()
       ->needs(env);
-  command->callback([options, &run] { run = [options] { return report(*options); }; });
+  command->callback([=, &run] {
+    std::error_code error;
+    const bool folder = fs::is_directory(options->log, error);
+    refuse_alone(*world, !folder, "one log");
+    refuse_alone(*env, !folder, "one log");
+    run = [options] { return report(*options); };
+  });
 }
 
 }  // namespace roborun::app

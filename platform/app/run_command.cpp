@@ -25,6 +25,7 @@
 #include "platform/mission/mission_config.hpp"
 #include "platform/report/flight_page.hpp"
 #include "platform/report/progress_line.hpp"
+#include "platform/report/status_screen.hpp"
 #include "platform/rt/confinement.hpp"
 #include "platform/vehicle/vehicle_file.hpp"
 #include "platform/viewer/live_server.hpp"
@@ -290,6 +291,7 @@ int run_flight(const RunOptions& options) {
   const input::StopOnSignal stop;
   config.stop = &input::StopOnSignal::requested;
   std::optional<report::ProgressLine> line(std::in_place);
+  std::optional<report::StatusScreen> screen(std::in_place, stderr);
   const live::LiveReport report = live::run_live(
       config,
       [&line](const std::vector<live::Need>& needs) {
@@ -298,12 +300,18 @@ int run_flight(const RunOptions& options) {
             std::find_if(needs.begin(), needs.end(), [](const auto& n) { return !n.lacks.empty(); });
         line->show(fmt::format("waits for {}: {}", lacking->device, lacking->lacks));
       },
-      [&line](const live::LiveProgress& p) {
-        if (line->due())
-          line->show(fmt::format("{} {:5.0f} s, {:6.1f} m to the goal, {:4.1f} m/s", p.doing, p.time_s,
-                                 p.to_goal_m, p.speed_mps));
+      [&](const live::LiveProgress& p) {
+        line.reset();
+        if (screen->due())
+          screen->show({{p.doing, fmt::format("{:.0f} s", p.time_s)},
+                        {"goal", fmt::format("{:.1f} m away", p.to_goal_m)},
+                        {"speed", fmt::format("{:.1f} m/s", p.speed_mps)},
+                        {"height", fmt::format("{:.1f} m", p.height_m)},
+                        {"decisions", fmt::format("{}", p.decisions)},
+                        {"failsafe", p.action}});
       });
   line.reset();
+  screen.reset();
   if (!report.ready) {
     if (input::StopOnSignal::requested()) throw input::Interrupted("before anything was armed");
     refuse(options, report);

@@ -266,7 +266,9 @@ void LiveRun::fly(const std::function<void(const LiveProgress&)>& progress) {
     if (progress && now_s > told_s + 0.25) {
       told_s = now_s;
       progress({now_s, end_.to_goal_m(), seen_.speed_mps.load(std::memory_order_relaxed),
-                governor::to_string(seen_.phase.load(std::memory_order_relaxed))});
+                seen_.z_m.load(std::memory_order_relaxed), seen_.decisions.load(std::memory_order_relaxed),
+                governor::to_string(seen_.phase.load(std::memory_order_relaxed)),
+                governor::to_string(seen_.action.load(std::memory_order_relaxed))});
     }
   }
   lanes_.stop();

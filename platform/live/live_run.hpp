@@ -45,7 +45,10 @@ struct LiveConfig {
 
 struct LiveProgress {
   double time_s{}, to_goal_m{}, speed_mps{};
-  const char* doing{};  ///< Phase of the flight.
+  double height_m{};  ///< World frame.
+  std::uint64_t decisions{};
+  const char* doing{};   ///< Phase of the flight.
+  const char* action{};  ///< Of the failsafe.
 };
 
 /// What there is to say about the autopilot at the end.

@@ -5,20 +5,15 @@
 #include "platform/input/input_error.hpp"
 
 namespace roborun::log {
-namespace {
-
-constexpr int kLevel = 1;  // DECISIONS.md
-
-}  // namespace
 
 Compressor::Compressor()
     : context_(ZSTD_createCCtx(), [](ZSTD_CCtx* context) { (void)ZSTD_freeCCtx(context); }) {}
 
-std::string_view Compressor::run(std::string_view bytes) {
+std::string_view Compressor::run(std::string_view bytes, int level) {
   if (!context_) return {};
   out_.resize(ZSTD_compressBound(bytes.size()));
   const std::size_t n =
-      ZSTD_compressCCtx(context_.get(), out_.data(), out_.size(), bytes.data(), bytes.size(), kLevel);
+      ZSTD_compressCCtx(context_.get(), out_.data(), out_.size(), bytes.data(), bytes.size(), level);
   return ZSTD_isError(n) != 0 ? std::string_view() : std::string_view(out_).substr(0, n);
 }
 

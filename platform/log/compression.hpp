@@ -11,11 +11,14 @@ struct ZSTD_DCtx_s;
 
 namespace roborun::log {
 
+/// Levels of zstd (DECISIONS.md): of noise, where a higher one finds nothing, and of all else.
+inline constexpr int kLevelOfNoise = 1, kLevel = 7;
+
 class Compressor {
  public:
   Compressor();
   /// One frame, valid until the next call; empty if there is no memory.
-  [[nodiscard]] std::string_view run(std::string_view bytes);
+  [[nodiscard]] std::string_view run(std::string_view bytes, int level);
 
  private:
   std::unique_ptr<ZSTD_CCtx_s, void (*)(ZSTD_CCtx_s*)> context_;

@@ -98,6 +98,8 @@ std::string state_json(const StateRecord& r) {
   return std::string(j.done());
 }
 
+}  // namespace
+
 std::string decision_json(const DecisionEntry& e) {
   JsonText j;
   j.number("number", static_cast<double>(e.number), 0)
@@ -125,8 +127,6 @@ std::string decision_json(const DecisionEntry& e) {
   j.json("missed", e.missed ? "true" : "false").json("why", list_of(why));
   return std::string(j.done());
 }
-
-}  // namespace
 
 FlightLog::FlightLog(const std::string& path, bool synced)
     : file_(path, synced), writer_(file_, "", "roborun", {.chunk_ns = kChunk_ns}) {

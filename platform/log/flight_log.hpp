@@ -21,6 +21,9 @@ struct RingDrops {
   bool operator==(const RingDrops&) const = default;
 };
 
+/// The message of `/decision`.
+[[nodiscard]] std::string decision_json(const DecisionEntry& entry);
+
 /// One thread. Nothing after the constructor throws but std::bad_alloc: a flight goes on without its log, and error() tells.
 class FlightLog final : public LogSink {
  public:

@@ -93,7 +93,7 @@ void McapWriter::close_chunk() {
   chunk.first_ns = first_ns_;
   chunk.last_ns = last_ns_;
   chunk.uncompressed = records_.size();
-  std::string_view body = options_.compressed ? compressor_.run(records_) : std::string_view();
+  std::string_view body = options_.compressed ? compressor_.run(records_, kLevel) : std::string_view();
   chunk.compression = body.empty() ? "" : "zstd";
   if (body.empty()) body = records_;
   chunk.compressed = body.size();

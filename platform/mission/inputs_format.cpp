@@ -95,8 +95,11 @@ std::string InputBatch::take() {
   words.widths += words_.widths;
   words.bits += words_.bits;
   std::string message;
-  for (const std::string* part : {&records, &words.widths})
-    log::Put(message).number(static_cast<std::uint32_t>(part->size())).text(compressor_.run(*part));
+  const auto put = [&](const std::string& part, int level) {
+    log::Put(message).number(static_cast<std::uint32_t>(part.size())).text(compressor_.run(part, level));
+  };
+  put(records, log::kLevel);
+  put(words.widths, log::kLevelOfNoise);
   message += words.bits;
   kinds_.clear();
   heads_.clear();

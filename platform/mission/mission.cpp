@@ -212,6 +212,7 @@ class MissionRun {
   std::unique_ptr<log::FlightLog> log_;                                   ///< Null: there is none.
   std::unique_ptr<FlightRecorder> recorder_;                              ///< Null: no inputs are recorded.
   std::atomic<double> cap_mps_{std::numeric_limits<double>::infinity()};  ///< As a route says.
+  bool changed_{false};                                                   ///< The governor's settings.
   FlightSetup setup_;
   std::vector<core::CostProfile> prices_;  ///< Those flown, and those of this machine if they are known.
   TimedMap timed_map_;
@@ -249,7 +250,7 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
                     ? std::make_unique<FlightRecorder>(*log_, aircraft_, cameras_, rig_.lidars())
                     : nullptr),
       setup_(flight_config_, config.backends, image_limits(config),
-             parts_of(config.own, config.route, cap_mps_)),
+             parts_of(parts_of(config.own, config.route, cap_mps_), config.change, changed_)),
       prices_(prices_of(config, flight_config_)),
       timed_map_(setup_.parts().map, prices_),
       timed_planner_(setup_.parts().planner, prices_),
@@ -266,7 +267,7 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
   if (!config.flight.answers) aircraft_.ignore_kill_switch();
   if (!log_) return;
   begin_log(*log_, recorded_flight_of(flight_config_, config_, cameras_, rig_.lidars()),
-            why_not_replayed(config_), config_.profile_name, world_.start_W());
+            why_not_replayed(config_), config_.profile_name, world_.start_W(), config_.source);
   log_->world(shapes_json(world_));
 }
 
@@ -468,6 +469,7 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
     give_goals();
     follow_route(frame);
     const MonotonicTime now = flight_.now() + config_.flight.minor_frame;
+    changed_ = config_.change.is_due(now);
     if (const flight::DecisionOutput* decision = flight_.step(faults_.computer(now))) {
       record_decision(*decision);
     }

@@ -13,6 +13,7 @@
 #include "platform/flight/flight_config.hpp"
 #include "platform/mission/autopilot_choice.hpp"
 #include "platform/mission/route.hpp"
+#include "platform/mission/setting_change.hpp"
 #include "platform/sitl/aircraft/simulated_aircraft.hpp"
 #include "platform/sitl/fault/fault_line.hpp"
 #include "platform/sitl/world/world.hpp"
@@ -76,12 +77,15 @@ struct MissionConfig {
   double host_factor{1.0};  ///< flight.costs are so many times those of the machine that was measured.
   std::optional<AutopilotChoice> autopilot{};  ///< Who flies the vehicle; none: the runtime, to the motors.
   SlowDown slow_down{};
+  SettingChange change{};  ///< Goes without `route` and own.policy.
   JudgeConfig judge{};
   std::optional<Route> route{};      ///< Flown in the place of the world's goal; goes without `goals`.
   std::vector<GivenGoals> goals{};   ///< Besides the world's, by time.
   std::vector<TimedFault> faults{};  ///< At most sitl::FaultLine::kMost.
   std::string log{};                 ///< File for the log of the flight; empty: none.
-  bool keep_known{false};            ///< report.known, at the height of the world's start.
+  std::string
+      source{};  ///< For the log: the files and options it is flown by, a JSON object that its maker reads; or empty.
+  bool keep_known{false};  ///< report.known, at the height of the world's start.
   /// Called after every minor frame, may be empty: what a test measures.
   std::function<void(const FrameRecord&)> each_frame{};
 };

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "platform/flight/flight_system.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/json_reader.hpp"
 #include "platform/report/build_identity.hpp"
@@ -153,7 +154,8 @@ std::vector<firmware_if::CameraMount> read_mounts(const Json& json, const char* 
 RecordedFlight recorded_flight_of(const flight::FlightConfig& flight, const MissionConfig& config,
                                   std::span<firmware_if::DepthCamera* const> cameras,
                                   std::span<firmware_if::Lidar* const> lidars) {
-  RecordedFlight recorded{flight, config.backends, config.slow_down, sitl::rig_of(config.simulator), {}, {}};
+  RecordedFlight recorded{
+      flight, config.backends, config.slow_down, config.change, sitl::rig_of(config.simulator), {}, {}};
   for (const firmware_if::DepthCamera* camera : cameras) recorded.mounts.push_back(camera->mount());
   for (const firmware_if::Lidar* lidar : lidars) recorded.lidar_mounts.push_back(lidar->mount());
   return recorded;
@@ -183,6 +185,10 @@ std::string to_json(const RecordedFlight& recorded) {
     j["slow_down_at_s"] = recorded.slow_down.at_s;
     j["slow_down_factor"] = recorded.slow_down.factor;
   }
+  if (!recorded.change.empty()) {
+    j["changed_at_s"] = recorded.change.at_s;
+    for (const auto& [key, value] : recorded.change.to) j["changed"].push_back({key, value});
+  }
   j["answers"] = flight.answers;
   j["fence"] = fence_json(flight.fence);
   j["mounts"] = mounts_json(recorded.mounts);
@@ -195,13 +201,14 @@ std::string to_json(const RecordedFlight& recorded) {
 }
 
 void begin_log(log::FlightLog& log, const RecordedFlight& recorded, const std::string& why_not,
-               const std::string& profile, const std::optional<Vector3>& start_W) {
+               const std::string& profile, const std::optional<Vector3>& start_W, const std::string& source) {
   const report::BuildIdentity build = report::build_identity();
   const log::StringMap identity{{"commit", std::string(build.commit)},
                                 {"compiler", std::string(build.compiler)},
                                 {"flags", std::string(build.flags)}};
   Json json = {{"build", identity}, {"profile", profile}, {"replay", why_not}};
   if (start_W) json["start_m"] = vector_json(*start_W);
+  if (!source.empty()) json["source"] = Json::parse(source);
   json["flight"] = Json::parse(to_json(recorded));
   log.configure(json.dump(), identity);
 }
@@ -240,6 +247,10 @@ RecordedFlight recorded_flight_from(std::string_view json) {
   flight.gaze.lead_s = number(gaze, "lead_s", 0, 100);
   if (j.contains("slow_down_at_s"))
     recorded.slow_down = {number(j, "slow_down_at_s", 0, 1e6), number(j, "slow_down_factor", 0.001, 1000)};
+  if (j.contains("changed_at_s")) {
+    recorded.change.at_s = number(j, "changed_at_s", 0, 1e6);
+    recorded.change.to = j.at("changed").get<std::vector<std::pair<std::string, double>>>();
+  }
   flight.answers = j.at("answers").get<bool>();
   flight.fence = read_fence(j.at("fence"));
   recorded.mounts = read_mounts(j, "mounts", recorded.sensors.cameras.size());
@@ -254,6 +265,7 @@ RecordedFlight recorded_flight_from(std::string_view json) {
     numbers(j.at("models").at(i), "fixed_s", flight.model[i].fixed_s);
     numbers(j.at("models").at(i), "slope_s_per_m3", flight.model[i].slope_s_per_m3);
   }
+  (void)changed(flight::governor_config(flight), recorded.change);
   return recorded;
 }
 

@@ -21,6 +21,7 @@ struct RecordedFlight {
   flight::FlightConfig flight{};
   board::BackendNames backends{};
   SlowDown slow_down{};
+  SettingChange change{};
   SensorRig sensors{};
   std::vector<firmware_if::CameraMount> mounts{};        ///< One per camera, as the device gave it.
   std::vector<firmware_if::CameraMount> lidar_mounts{};  ///< One per LiDAR.
@@ -32,9 +33,10 @@ struct RecordedFlight {
                                                 std::span<firmware_if::DepthCamera* const> cameras,
                                                 std::span<firmware_if::Lidar* const> lidars);
 [[nodiscard]] std::string to_json(const RecordedFlight& recorded);
-/// The first messages of a log: build, configuration. `why_not`: as of why_not_replayed().
+/// The first messages of a log: build, configuration. `why_not`: as of why_not_replayed(). `source`: as in MissionConfig.
 void begin_log(log::FlightLog& log, const RecordedFlight& recorded, const std::string& why_not,
-               const std::string& profile = {}, const std::optional<Vector3>& start_W = {});
+               const std::string& profile = {}, const std::optional<Vector3>& start_W = {},
+               const std::string& source = {});
 /// Throws InputError, or another std::exception that says what is wrong.
 [[nodiscard]] RecordedFlight recorded_flight_from(std::string_view json);
 

@@ -10,6 +10,7 @@
 #include "platform/input/json_reader.hpp"
 #include "platform/log/flight_log.hpp"
 #include "platform/mission/decision_values.hpp"
+#include "platform/mission/flight_records.hpp"
 #include "platform/mission/flight_setup.hpp"
 
 namespace roborun::mission {
@@ -293,11 +294,12 @@ struct Devices {
 class Replay {
  public:
   explicit Replay(const std::string& path);
-  ReplayResult run(const std::function<void(double)>& progress, double until_s);
+  ReplayResult run(const std::function<void(double)>& progress, double until_s,
+                   const std::function<void(const log::DecisionEntry&)>& decided);
 
  private:
   void give_goals();
-  void step();
+  void step(const std::function<void(const log::DecisionEntry&)>& decided);
 
   Recording recording_;
   FlightDigest digest_;
@@ -305,6 +307,7 @@ class Replay {
   ReplayedAircraft aircraft_;
   Devices<ReplayedCamera, firmware_if::DepthCamera> cameras_;
   Devices<ReplayedLidar, firmware_if::Lidar> lidars_;
+  bool changed_{false};  ///< The governor's settings.
   FlightSetup setup_;
   flight::LockstepFlight flight_;
   ReplayResult result_;
@@ -318,7 +321,8 @@ Replay::Replay(const std::string& path)
       lidars_(recording_, recording_.flight().lidar_mounts.size()),
       setup_(recording_.flight().flight, recording_.flight().backends,
              board::image_limits(recording_.flight().sensors, recording_.flight().flight.vehicle,
-                                 lattice_of(recording_.flight().flight))),
+                                 lattice_of(recording_.flight().flight)),
+             parts_of({}, recording_.flight().change, changed_)),
       flight_(recording_.flight().flight, aircraft_, cameras_.pointers, setup_.parts(), setup_.arena(),
               lidars_.pointers) {
   setup_.check();
@@ -335,14 +339,18 @@ void Replay::give_goals() {
   recording_.next();
 }
 
-void Replay::step() {
+void Replay::step(const std::function<void(const log::DecisionEntry&)>& decided) {
   const RecordedFlight& recorded = recording_.flight();
   ++result_.replayed.minor_frames;
-  if (const flight::DecisionOutput* decision =
-          flight_.step({.slower = recorded.slow_down.slower(flight_.now() + recorded.flight.minor_frame)})) {
+  const MonotonicTime now = flight_.now() + recorded.flight.minor_frame;
+  changed_ = recorded.change.is_due(now);
+  if (const flight::DecisionOutput* decision = flight_.step({.slower = recorded.slow_down.slower(now)})) {
     ++result_.replayed.decisions;
     digest_.add(*decision);
     comparison_.decision(*decision);
+    if (decided && !comparison_.first())
+      decided(decision_entry(flight_.system(), *decision, lattice_of(recorded.flight),
+                             result_.replayed.decisions, now, {}));
   }
   if (recording_.kind() == RecordKind::kGiveUp) {
     flight_.system().decision_program().give_up();
@@ -352,7 +360,8 @@ void Replay::step() {
   result_.seconds = seconds(flight_.now().time_since_epoch());
 }
 
-ReplayResult Replay::run(const std::function<void(double)>& progress, double until_s) {
+ReplayResult Replay::run(const std::function<void(double)>& progress, double until_s,
+                         const std::function<void(const log::DecisionEntry&)>& decided) {
   double told_s = 0.0;
   // Goals come before the frame from which on they are there.
   while (recording_.kind() == RecordKind::kFrame || recording_.kind() == RecordKind::kGoals) {
@@ -361,7 +370,7 @@ ReplayResult Replay::run(const std::function<void(double)>& progress, double unt
       continue;
     }
     if (seconds((flight_.now() + recording_.flight().flight.minor_frame).time_since_epoch()) > until_s) break;
-    step();
+    step(decided);
     if (comparison_.first()) break;
     if (progress && result_.seconds >= told_s + 1.0) progress(told_s = result_.seconds);
   }
@@ -381,8 +390,8 @@ ReplayResult Replay::run(const std::function<void(double)>& progress, double unt
 }  // namespace
 
 ReplayResult replay_flight(const std::string& path, const std::function<void(double)>& progress,
-                           double until_s) {
-  return std::make_unique<Replay>(path)->run(progress, until_s);
+                           double until_s, const std::function<void(const log::DecisionEntry&)>& decided) {
+  return std::make_unique<Replay>(path)->run(progress, until_s, decided);
 }
 
 }  // namespace roborun::mission

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "platform/log/log_records.hpp"
 #include "platform/log/mcap_reader.hpp"
 #include "platform/mission/inputs_format.hpp"
 #include "platform/mission/recorded_flight.hpp"
@@ -72,8 +73,10 @@ struct ReplayResult {
 
 /// Flies on recorded inputs alone, through the same executive, programs and stages, and compares every motor command and
 /// decision; of a whole log the map in the end, too. Throws InputError for a file that is no log, or has no inputs. `until_s`: no
-/// minor frame after it. `progress` (may be empty) gets the seconds done, once a second of flight.
+/// minor frame after it. `progress` (may be empty) gets the seconds done, once a second of flight; `decided` (the same) each
+/// decision that is the recorded one, as it stands in a log.
 [[nodiscard]] ReplayResult replay_flight(const std::string& path, const std::function<void(double)>& progress,
-                                         double until_s = std::numeric_limits<double>::infinity());
+                                         double until_s = std::numeric_limits<double>::infinity(),
+                                         const std::function<void(const log::DecisionEntry&)>& decided = {});
 
 }  // namespace roborun::mission

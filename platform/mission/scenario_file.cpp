@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "platform/board/board_profile.hpp"
 #include "platform/input/arguments.hpp"
@@ -232,7 +233,12 @@ Scenario ScenarioReader::read() {
 
 }  // namespace
 
-Scenario load_scenario(const std::string& path) { return ScenarioReader(path).read(); }
+Scenario load_scenario(const std::string& path) {
+  Scenario scenario = ScenarioReader(path).read();
+  scenario.config.source = nlohmann::json{{"scenario", std::filesystem::absolute(path).string()}}.dump(
+      -1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return scenario;
+}
 
 bool is_scenario(const std::string& path) {
   const toml::table root = input::parse_toml(path, input::read_text(path, "a readable TOML file"));

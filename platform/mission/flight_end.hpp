@@ -1,0 +1,30 @@
+/// How a flight ended, from its log: what tables of flights show.
+#pragma once
+
+#include <limits>
+#include <string>
+
+namespace roborun::mission {
+
+inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// NaN: the log does not say.
+struct FlightEnd {
+  bool has_result{false};  ///< `/result` is there: a simulated flight that was logged to its end.
+  bool reached{false}, collided{false};
+  std::string reason;   ///< Why it ended; of a log without a result its last event.
+  double recorded_s{};  ///< Until here there is something in the log.
+  double time_s{kUnknown}, mean_mps{kUnknown}, distance_m{kUnknown}, energy_kJ{kUnknown};
+  double closest_m{kUnknown};  ///< The nearest obstacle that the vehicle has seen at a decision.
+  std::size_t decisions{};
+  std::string damage;  ///< Empty, or one line: where the log ends early, and why.
+  [[nodiscard]] bool good() const noexcept { return has_result && reached && !collided; }
+};
+
+/// Throws InputError for what cannot be read, for what is no flight log, and for a result that is none.
+[[nodiscard]] FlightEnd end_of(const std::string& path);
+
+/// Empty, or the one line that refuses a moment behind the end of the log (`option`: who asks).
+[[nodiscard]] std::string beyond(const FlightEnd& end, const char* option, double at_s);
+
+}  // namespace roborun::mission

@@ -1,0 +1,50 @@
+#include "platform/report/status_screen.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <string_view>
+
+namespace roborun::report {
+namespace {
+
+/// A terminal that moves its cursor.
+bool is_screen(std::FILE* file) {
+  const char* const kind = std::getenv("TERM");
+  return isatty(fileno(file)) != 0 && kind != nullptr && std::string_view(kind) != "dumb";
+}
+
+}  // namespace
+
+StatusScreen::StatusScreen(std::FILE* to) : to_(to), terminal_(is_screen(to)), last_(Clock::now()) {}
+
+StatusScreen::~StatusScreen() {
+  if (shown_ == 0) return;
+  fmt::print(to_, "\x1b[{}A\x1b[J", shown_);
+  (void)std::fflush(to_);
+}
+
+bool StatusScreen::due() const {
+  return std::chrono::duration<double>(Clock::now() - last_).count() >= (terminal_ ? 0.2 : 10.0);
+}
+
+void StatusScreen::show(const std::vector<Row>& rows) {
+  if (!due()) return;
+  last_ = Clock::now();
+  std::string text = shown_ > 0 ? fmt::format("\x1b[{}A", shown_) : "";
+  for (const auto& [what, how] : rows) {
+    if (terminal_)
+      text += fmt::format("{:<10} {}\x1b[K\n", what, how);
+    else
+      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", what, how);
+  }
+  if (terminal_)
+    shown_ = rows.size();
+  else
+    text += "\n";
+  fmt::print(to_, "{}", text);
+  (void)std::fflush(to_);
+}
+
+}  // namespace roborun::report
