@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/geometry/math.hpp"
 
@@ -30,6 +31,15 @@ FollowedLimits followed_limits(const VehicleModel& v) noexcept {
   constexpr double kBeside = 0.5;
   return {std::clamp(across_mps2(v), kLeastBraking_mps2, v.acceleration_mps2),
           std::min(v.jerk_mps3, v.tracking_error_m / (kBeside * v.motor_lag_s))};
+}
+
+double level_speed_mps(const VehicleModel& v) noexcept {
+  // (linear + quadratic v) v = force; as 2 c / (b + sqrt(...)), which holds without quadratic drag, too.
+  const double force_N = v.mass_kg * (tilt_acceleration_mps2(v) - kLeastBraking_mps2 / kUsable);
+  if (!(force_N > 0.0)) return 0.0;
+  const double linear = v.drag_linear_Nspm;
+  const double root = std::sqrt(linear * linear + 4.0 * v.drag_quadratic_Ns2pm2 * force_N);
+  return linear + root > 0.0 ? 2.0 * force_N / (linear + root) : std::numeric_limits<double>::infinity();
 }
 
 double speeding_up_mps2(const VehicleModel& v, double speed_mps) noexcept {
@@ -63,7 +73,7 @@ const char* cannot_fly(const VehicleModel& v, double visible_m) noexcept {
   const core::SinCos tilt = core::sin_cos(v.tilt_rad);
   if (thrust_to_weight_ratio(v) * tilt.cos < 1.0)
     return "cannot hold its height at limits.tilt_rad: must have thrust-to-weight of at least 1 / cos(tilt)";
-  if (left_mps2(v, v.speed_mps) < kLeastBraking_mps2)
+  if (v.speed_mps > level_speed_mps(v))
     return "cannot fly as fast as limits.speed_mps: its drag there must be below g tan(limits.tilt_rad)";
   // Not as slowly as the slowest useful flight: as fast as its limit says is a question of the world.
   constexpr double kSlow_mps = 0.5;

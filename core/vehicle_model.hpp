@@ -121,6 +121,9 @@ struct FollowedLimits {
   double acceleration_mps2, jerk_mps3;
 };
 [[nodiscard]] FollowedLimits followed_limits(const VehicleModel& vehicle) noexcept;
+/// Fastest level flight in still air: beyond it drag leaves less than 0.2 m/s2 of the acceleration that the tilt limit gives to trajectories.
+/// +infinity without drag, 0 where the tilt gives less than that at rest. RT-safe: O(1).
+[[nodiscard]] double level_speed_mps(const VehicleModel& vehicle) noexcept;
 /// With what the speed may rise up to `speed_mps`: drag there is against it. RT-safe: O(1).
 [[nodiscard]] double speeding_up_mps2(const VehicleModel& vehicle, double speed_mps) noexcept;
 /// How far it travels until it stands, as trajectories end: measured, or derived from followed_limits().

@@ -88,6 +88,8 @@ class Governor final : public DecisionPolicy {
   void observe(core::StageId id, double predicted_s, double spent_s) noexcept override;
   /// Largest v with (visible - d_stop(v)) / (decisions_per_budget * v) >= latency; 0 if none. Closed form.
   [[nodiscard]] double safe_speed_mps(double visible_m, double latency_s) const noexcept;
+  /// Returns how fast the next trajectory may be in this situation, with decisions of this length.
+  [[nodiscard]] double speed_limit_mps(const Situation& situation, double deadline_s) const noexcept;
   /// Speed limit of the static designs; the aware design's upper bound.
   [[nodiscard]] double v_max_mps() const noexcept override { return v_max_mps_; }
 
@@ -107,7 +109,6 @@ class Governor final : public DecisionPolicy {
   [[nodiscard]] Precision in_time(const Task& task, int asked_level, double deadline_s) const noexcept;
   [[nodiscard]] SolverProblem problem_of(const Task& task, const Precision& precision, double deadline_s,
                                          double plan_m3) const noexcept;
-  [[nodiscard]] double speed_limit_mps(const Situation& situation, double deadline_s) const noexcept;
 
   /// Levels finer than asked for after so many failed decisions.
   [[nodiscard]] int finer_levels(const Situation& situation) const noexcept;

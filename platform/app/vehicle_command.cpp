@@ -10,12 +10,12 @@
 #include <string>
 
 #include "core/geometry/math.hpp"
-#include "governor/policy/governor.hpp"
 #include "platform/app/exit_code.hpp"
 #include "platform/board/backends.hpp"
 #include "platform/flight/flight_system.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/mission/mission_config.hpp"
+#include "platform/mission/speed_limits.hpp"
 #include "platform/vehicle/vehicle_file.hpp"
 
 namespace roborun::app {
@@ -32,10 +32,10 @@ struct Consequences {
   std::array<std::array<double, 2>, 4> stop{};  ///< Speed, distance.
   double range_m{};                             ///< Of its sensors, the shortest.
   double blind_deg{};                           ///< Widest angle to the nearest direction that is seen.
-  double fastest_mps{};                         ///< That can stop within what is seen, thinking for 0.2 s.
-  Vector3 assumed_half_m = Vector3::Zero();     ///< flight::assumed_free_half_m().
-  double gap_m{};                               ///< The narrowest that plans go through.
-  std::size_t bytes{};                          ///< In a world of 100 x 100 x 10 m.
+  mission::SpeedLimits speed;
+  Vector3 assumed_half_m = Vector3::Zero();  ///< flight::assumed_free_half_m().
+  double gap_m{};                            ///< The narrowest that plans go through.
+  std::size_t bytes{};                       ///< In a world of 100 x 100 x 10 m.
 };
 
 Consequences consequences_of(const vehicle::Vehicle& vehicle) {
@@ -59,10 +59,7 @@ Consequences consequences_of(const vehicle::Vehicle& vehicle) {
   c.blind_deg = widest_blind_angle_rad(rig) * 180.0 / core::kPi;
   c.assumed_half_m = flight::assumed_free_half_m(v, config.flight.sees_all_around,
                                                  config.flight.level_view_ratio, config.flight.too_near_m);
-  governor::GovernorConfig g;
-  g.stopping = stop;
-  constexpr double kThinking_s = 0.2;
-  c.fastest_mps = governor::Governor(g).safe_speed_mps(c.range_m - planned_radius_m(v), kThinking_s);
+  c.speed = mission::speed_limits(config.flight);
   c.gap_m = 2.0 * planned_radius_m(v);
   c.bytes = flight::FlightSystem::arena_bytes(config.flight) +
             board::backend_bytes(map_bounds_W(config.flight), images) + sizeof(flight::FlightSystem);
@@ -88,9 +85,10 @@ std::vector<std::string> models_of(const SensorRig& rig) {
 std::vector<std::string> shortcomings_of(const vehicle::Vehicle& vehicle, const Consequences& c) {
   std::vector<std::string> lines;
   const VehicleModel& v = vehicle.model;
-  if (c.fastest_mps < v.speed_mps)
-    lines.push_back(
-        fmt::format("cannot use its {:.1f} m/s: what it sees allows {:.1f} m/s", v.speed_mps, c.fastest_mps));
+  const mission::SpeedLimit& lowest = c.speed.lowest();
+  if (lowest.speed_mps < v.speed_mps)
+    lines.push_back(fmt::format("cannot use its {:.1f} m/s: {} allows {:.1f} m/s", v.speed_mps, lowest.name,
+                                lowest.speed_mps));
   if (c.thrust_to_weight_ratio < 1.6)
     lines.push_back(
         fmt::format("has little thrust for wind: thrust-to-weight {:.2f}", c.thrust_to_weight_ratio));
@@ -102,6 +100,24 @@ std::vector<std::string> shortcomings_of(const vehicle::Vehicle& vehicle, const 
         c.assumed_half_m.x(), c.assumed_half_m.z()));
   lines.push_back(fmt::format("cannot pass gaps narrower than {:.2f} m", c.gap_m));
   return lines;
+}
+
+nlohmann::ordered_json json_of(const std::vector<mission::SpeedLimit>& limits) {
+  nlohmann::ordered_json array = nlohmann::ordered_json::array();
+  for (const mission::SpeedLimit& limit : limits)  // infinity, without drag, is null in JSON
+    array.push_back({{"name", limit.name}, {"speed_mps", limit.speed_mps}, {"why", limit.why}});
+  return array;
+}
+
+void print_speeds(const mission::SpeedLimits& speed) {
+  const mission::SpeedLimit& lowest = speed.lowest();
+  fmt::print("\nin the open            m/s  set by\n");
+  for (const mission::SpeedLimit& limit : speed.always)
+    fmt::print("  {:<18}{:>6.1f}  {}{}\n", limit.name, limit.speed_mps, limit.why,
+               &limit == &lowest ? "   <- limits it" : "");
+  fmt::print("lower where\n");
+  for (const mission::SpeedLimit& limit : speed.where)
+    fmt::print("  {:<18}{:>6.1f}  {}\n", limit.name, limit.speed_mps, limit.why);
 }
 
 int check(const VehicleOptions& options) {
@@ -118,7 +134,10 @@ int check(const VehicleOptions& options) {
                                 {"sensor_models", models_of(vehicle.rig)},
                                 {"range_m", c.range_m},
                                 {"blind_deg", c.blind_deg},
-                                {"fastest_mps", c.fastest_mps},
+                                {"speed_mps", c.speed.lowest().speed_mps},
+                                {"speed_limited_by", c.speed.lowest().name},
+                                {"speed_limits", json_of(c.speed.always)},
+                                {"speed_where", json_of(c.speed.where)},
                                 {"narrowest_gap_m", c.gap_m},
                                 {"bytes", c.bytes},
                                 {"cannot", cannot}};
@@ -136,13 +155,13 @@ int check(const VehicleOptions& options) {
   for (const auto& [speed_mps, distance_m] : c.stop)
     fmt::print(" {:.2f} m from {:.1f} m/s{}", distance_m, speed_mps,
                speed_mps < vehicle.model.speed_mps ? "," : "\n");
-  fmt::print("sees                 {:.0f} m: enough for {:.1f} m/s, when it thinks for 0.2 s\n", c.range_m,
-             c.fastest_mps);
+  fmt::print("sees                 {:.0f} m\n", c.range_m);
   fmt::print("simulated with       {}\n", fmt::join(models_of(vehicle.rig), ", "));
   fmt::print("widest blind angle   {:.0f} degrees\n", c.blind_deg);
   fmt::print("memory               {:.1f} MiB in a world of 100 x 100 x 10 m\n",
              static_cast<double>(c.bytes) / 1048576.0);
   for (const std::string& line : cannot) fmt::print("it                   {}\n", line);
+  print_speeds(c.speed);
   return kDone;
 }
 
@@ -171,14 +190,22 @@ void add_vehicle_command(CLI::App& app, std::function<int()>& run) {
       "  roborun vehicle check x500\n"
       "  roborun vehicle check mine.toml        a copy of platform/vehicle/x500.toml with your numbers\n"
       "  roborun fly --vehicle mine.toml\n\n"
+      "check ends with the speed that the vehicle can be flown at in the open, by what limits it:\n"
+      "  file   limits.speed_mps\n"
+      "  sight  a stop within the range of its sensors, with the decisions of the flight\n"
+      "  drag   level flight at tilt_rad\n"
+      "and with what the flight lowers it to among thin things, beside what moves and near the goal. The "
+      "flight calls the same\n"
+      "functions. A plan may be slower still: around obstacles, and into what is not seen yet.\n\n"
       "All keys with unit, range and meaning: roborun config. Exit code: 0, or 2: the file is wrong, or its "
       "vehicle cannot fly.");
   command->require_subcommand(1);
   CLI::App* list_app = command->add_subcommand("list", "The vehicles that ship, paper first");
   list_app->add_flag("--json", options->json, "One JSON array on standard output, nothing else");
   list_app->callback([options, &run] { run = [options] { return list(*options); }; });
-  CLI::App* check_app = command->add_subcommand(
-      "check", "Stopping distances, thrust, what it sees, memory, and what it cannot do");
+  CLI::App* check_app = command->add_subcommand("check",
+                                                "Stopping distances, thrust, what it sees, memory, what it "
+                                                "cannot do, how fast it can fly and what limits that");
   check_app->add_option("FILE", options->file, "A vehicle file, or the name of a shipped vehicle")
       ->required();
   check_app->add_flag("--json", options->json, "One JSON object on standard output, nothing else");
