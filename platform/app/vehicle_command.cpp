@@ -196,7 +196,8 @@ void add_vehicle_command(CLI::App& app, std::function<int()>& run) {
       "  drag   level flight at tilt_rad\n"
       "and with what the flight lowers it to among thin things, beside what moves and near the goal. All but "
       "sight, a bound\n"
-      "beside the flight, are the flight's own numbers. A plan may be slower still: around obstacles, and into "
+      "beside the flight, are the flight's own numbers. A plan may be slower still: around obstacles, and "
+      "into "
       "what is not seen yet.\n\n"
       "All keys with unit, range and meaning: roborun config. Exit code: 0, or 2: the file is wrong, or its "
       "vehicle cannot fly.");
