@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <ctime>
 #include <fstream>
@@ -251,6 +252,7 @@ int audit(const AuditOptions& options) {
   }
   const bool terminal = isatty(STDERR_FILENO) != 0;
   const input::StopOnSignal stop;
+  (void)std::signal(SIGPIPE, SIG_IGN);  // who reads what is said may go: the flight does not end for it
   config.stop = &input::StopOnSignal::requested;
   if (const std::string kept = rt::drop_capabilities(); !kept.empty())
     fmt::print(stderr, "roborun: {}\n", kept);

@@ -45,6 +45,7 @@ std::string to_json(const FlightSource& source) {
   }
   j["vehicle"] = absolute(source.vehicle);
   j["settings"] = absolute(source.settings);
+  j["profile"] = absolute(source.profile);
   return j.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -65,6 +66,7 @@ FlightSource source_from(const Json& j) {
   }
   source.vehicle = j.at("vehicle").get<std::string>();
   source.settings = j.at("settings").get<std::string>();
+  source.profile = j.at("profile").get<std::string>();
   return source;
 }
 
@@ -96,7 +98,7 @@ PreparedFlight prepare(const FlightSource& source, std::uint64_t seed) {
   const vehicle::Vehicle vehicle = vehicle::load_vehicle(source.vehicle);
   mission::set_vehicle(config, vehicle);
   flight.inputs = vehicle.patterns;
-  for (const std::string& path : {source.vehicle, source.world, source.settings})
+  for (const std::string& path : {source.vehicle, source.world, source.settings, source.profile})
     flight.inputs.push_back(path);
   if (!source.settings.empty()) mission::load_settings(source.settings, config);
   config.seed = seed;
@@ -142,8 +144,9 @@ PreparedFlight prepare_again(const std::string& log) {
             fmt::format("{}: was flown at the costs of that machine (--profile host), which it does "
                         "not say: must be flown with another profile",
                         log));
-      flight = prepare(source_from(*source), recorded.flight.seed);
-      const board::Profile costs = board::load_profile(profile, recorded.backends);
+      const FlightSource flown = source_from(*source);
+      flight = prepare(flown, recorded.flight.seed);
+      const board::Profile costs = board::load_profile(flown.profile, recorded.backends);
       flight.config.flight.costs = costs.costs;
       flight.config.flight.model = costs.model;
     }

@@ -20,6 +20,7 @@ struct FlightSource {
   WorldArguments in_file;
   std::string vehicle{"paper"};
   std::string settings;
+  std::string profile{"paper"};  ///< Loaded by the caller.
 };
 
 struct PreparedFlight {

@@ -40,7 +40,6 @@ namespace {
 struct FlyOptions {
   FlightSource source;
   std::string design{"aware"};
-  std::string profile{"paper"};
   std::string seed{"1"};
   std::string map{"own"};
   std::string planner{"own"};
@@ -64,7 +63,7 @@ std::string host_file_of(const FlyOptions& options) {
 
 board::Profile profile_of(const FlyOptions& options) {
   const board::BackendNames backends{options.map, options.planner};
-  if (options.profile != "host") return board::load_profile(options.profile, backends);
+  if (options.source.profile != "host") return board::load_profile(options.source.profile, backends);
   std::string note;
   const board::Profile profile = board::host(host_file_of(options), backends, options.host_factor, note);
   if (!note.empty()) fmt::print(stderr, "roborun: {}\n", note);
@@ -133,8 +132,8 @@ int fly(const FlyOptions& options) {
   mission::MissionConfig& config = flight.config;
   const sitl::World& world = *flight.world;
   std::vector<std::string> inputs = flight.inputs;
-  for (const std::string& path : {options.profile, options.plan}) inputs.push_back(path);
-  if (options.profile == "host") inputs.push_back(host_file_of(options));
+  inputs.push_back(options.plan);
+  if (options.source.profile == "host") inputs.push_back(host_file_of(options));
   for (const std::string& name : {options.map, options.planner, options.ways})
     inputs.push_back(name.substr(name.find(':') + 1));  // of a plugin
   input::check_outputs({{"--log", options.log}, {"--trace", options.trace}, {"--plot", options.plot}},
@@ -147,16 +146,16 @@ int fly(const FlyOptions& options) {
   const board::Profile profile = profile_of(options);
   std::string title = flight.title;
   if (options.source.vehicle != "paper") title += fmt::format(", vehicle {}", options.source.vehicle);
-  title += fmt::format(", cost profile {}", options.profile);
+  title += fmt::format(", cost profile {}", options.source.profile);
 
   if (options.tune && !autopilot)
     throw InputError("--autopilot-tune: must go with --autopilot px4 or arducopter");
   if (autopilot) title += fmt::format(", flown by a fake {}", options.autopilot);
 
-  config.profile_name = options.profile;
+  config.profile_name = options.source.profile;
   config.flight.costs = profile.costs;
   config.flight.model = profile.model;
-  if (options.profile == "host")
+  if (options.source.profile == "host")
     config.host_factor = options.host_factor;
   else
     config.host_costs = board::known_host_costs({options.map, options.planner});
@@ -193,12 +192,13 @@ int fly(const FlyOptions& options) {
     result.believed = believes(options, reports.back());
     all_believed = all_believed && result.believed;
   }
-  if (options.profile != "host" && !config.host_costs && board::uses_plugin({options.map, options.planner}))
+  if (options.source.profile != "host" && !config.host_costs &&
+      board::uses_plugin({options.map, options.planner}))
     fmt::print(
         stderr,
         "roborun: this machine is not measured: what the plugin counts was compared with the profile {} "
         "alone (once roborun fly --profile host: with this machine too)\n",
-        options.profile);
+        options.source.profile);
 
   if (options.json) {
     for (const report::MissionReport& r : reports) fmt::print("{}\n", report::to_json(r.result));
@@ -255,7 +255,7 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
                    "aware, static (0.5 m/s as published), static-fair; several with commas")
       ->capture_default_str();
   fly_app
-      ->add_option("--profile", options->profile,
+      ->add_option("--profile", options->source.profile,
                    "What computing costs: paper (the authors' machine), host (this one), cortex-a72 (an "
                    "estimate), or a file of roborun calibrate")
       ->capture_default_str();
@@ -320,7 +320,7 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
           ->capture_default_str();
   fly_app->add_flag("--json", options->json, "One JSON object per design on standard output, nothing else");
   fly_app->callback([=, &run] {
-    const bool host = options->profile == "host";
+    const bool host = options->source.profile == "host";
     refuse_alone(*host_factor, host, "--profile host");
     refuse_alone(*host_file, host, "--profile host");
     refuse_alone(*colour, !options->plot.empty(), "--plot FILE");

@@ -169,8 +169,7 @@ int what_if(const ReplayOptions& options) {
   refuse_beyond(options);
   const mission::FlightEnd logged = mission::end_of(options.file);
   const flight::FlightConfig as_logged = mission::Recording(options.file).flight().flight;
-  for (const std::string& setting : options.what_if)
-    mission::change_in_flight(flight.config, as_logged, options.from_s, setting);
+  mission::change_in_flight(flight.config, as_logged, options.from_s, options.what_if);
   flight.inputs.push_back(options.file);
   input::check_outputs({{"--log", options.log}}, flight.inputs);
   std::optional<TemporaryLog> temporary;

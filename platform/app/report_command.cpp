@@ -108,6 +108,7 @@ FolderFiles files_in(const std::string& folder) {
   FolderFiles files;
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    if (std::error_code gone; !at->is_regular_file(gone)) continue;
     if (at->path().extension() == ".mcap") files.logs.push_back(at->path());
     if (at->path().extension() == ".jsonl") files.results.push_back(at->path());
   }
@@ -121,9 +122,22 @@ FolderFiles files_in(const std::string& folder) {
 }
 
 int report_folder(const ReportOptions& options) {
-  const FolderFiles files = files_in(options.log);
+  FolderFiles files = files_in(options.log);
   const std::string out = options.out.empty() ? (fs::path(options.log) / "index.html").string() : options.out;
   const auto page_of = [](fs::path log) { return log.replace_extension(".html"); };
+  std::vector<std::string> skipped;
+  // Names of pages come from the folder: nobody asked for what lies behind a link in it.
+  if (std::error_code error; options.out.empty() && fs::is_symlink(out, error))
+    throw InputError(fmt::format("{}: is a link: must be a file, or another one with -o", out));
+  std::erase_if(files.logs, [&](const fs::path& log) {
+    std::error_code error;
+    const fs::path page = page_of(log);
+    const bool bad = fs::is_symlink(page, error) || fs::absolute(page) == fs::absolute(out);
+    if (bad)
+      skipped.push_back(
+          fmt::format("{}: its page would be {}, a link or the table itself", log.string(), page.string()));
+    return bad;
+  });
   std::vector<input::NamedOutput> outputs{{"-o", out}};
   std::vector<std::string> inputs;
   for (const fs::path& log : files.logs) {
@@ -133,7 +147,6 @@ int report_folder(const ReportOptions& options) {
   for (const fs::path& results : files.results) inputs.push_back(results.string());
   input::check_outputs(outputs, inputs);
   std::vector<report::FolderRow> rows;
-  std::vector<std::string> skipped;
   const input::StopOnSignal stop;
   for (const fs::path& log : files.logs) {
     if (input::StopOnSignal::requested())
@@ -151,7 +164,13 @@ int report_folder(const ReportOptions& options) {
     row.page = fs::relative(page_of(log), fs::absolute(out).parent_path()).string();
     rows.push_back(std::move(row));
   }
-  for (const fs::path& results : files.results) add_results(results, rows, skipped);
+  for (const fs::path& results : files.results) {
+    try {
+      add_results(results, rows, skipped);
+    } catch (const InputError& error) {
+      skipped.emplace_back(error.what());
+    }
+  }
   for (const std::string& line : skipped) fmt::print(stderr, "roborun: left out: {}\n", line);
   if (rows.empty()) throw InputError(fmt::format("{}: none of its files holds a flight", options.log));
   const std::size_t count = rows.size();
@@ -181,13 +200,14 @@ void add_report_command(CLI::App& app, std::function<int()>& run) {
   command->footer(
       "Examples:\n"
       "  roborun fly --log flight.mcap && roborun report flight.mcap -o flight.html\n"
-      "  roborun scenario run scenarios --out failed; roborun report failed     a table of all that "
-      "failed\n\n"
+      "  roborun scenario run scenarios --out failed; roborun report failed     a table of those flights\n\n"
       "The page needs a browser of 2023 or newer, and no network. Arrow keys go from decision to decision, "
       "with shift\n"
       "10 s; a click on a chart chooses a moment. A log that was cut gives a page until the cut, and a line "
       "that says so.\n\n"
-      "In a folder what is damaged, or holds no flight, is named and left out.\n\n"
+      "In a folder what holds no flight is named and left out; a log that was cut stands in the table with a "
+      "note. Its verdict is\n"
+      "whether the goal was reached.\n\n"
       "Exit code: 0 the page was written, 2 bad input.");
   command
       ->add_option("log", options->log,

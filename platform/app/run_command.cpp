@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <csignal>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -289,6 +290,7 @@ int run_flight(const RunOptions& options) {
                server->port());
   }
   const input::StopOnSignal stop;
+  (void)std::signal(SIGPIPE, SIG_IGN);  // who reads what is said may go: the flight does not end for it
   config.stop = &input::StopOnSignal::requested;
   std::optional<report::ProgressLine> line(std::in_place);
   std::optional<report::StatusScreen> screen(std::in_place, stderr);

@@ -126,9 +126,10 @@ void V4l2Capture::choose_format(const CaptureWish& wish) {
                                  wish.width, wish.height));
   if (pix.field != V4L2_FIELD_NONE)
     throw InputError(fmt::format("{}: gives interlaced images: must be whole ones", device_));
-  const std::size_t row_bytes = kPixel_bytes * pix.width;
+  const std::size_t row_bytes =
+      kPixel_bytes * pix.width;  // of 32 bits on some machines: a driver may say more
   if (pix.bytesperline < row_bytes || pix.sizeimage > ROBORUN_PORT_MOST_BYTES ||
-      pix.sizeimage < (pix.height - 1) * std::size_t{pix.bytesperline} + row_bytes)
+      pix.sizeimage < (pix.height - 1) * std::uint64_t{pix.bytesperline} + row_bytes)
     throw InputError(
         fmt::format("{}: its driver says {} bytes for {} rows of {} bytes and {} pixels: impossible", device_,
                     pix.sizeimage, pix.height, pix.bytesperline, pix.width));

@@ -53,8 +53,10 @@ std::string keys_in_flight() {
   return all + fmt::format("{}, {}, {}", kFactor, kTimeLimit, kGoal);
 }
 
-void change_in_flight(MissionConfig& config, const flight::FlightConfig& logged, double at_s,
-                      const std::string& setting) {
+namespace {
+
+void change_one(MissionConfig& config, const flight::FlightConfig& logged, double at_s,
+                const std::string& setting) {
   const std::size_t equals = setting.find('=');
   if (equals == std::string::npos)
     throw InputError(fmt::format("--what-if: '{}': must be KEY=VALUE", setting));
@@ -67,8 +69,8 @@ void change_in_flight(MissionConfig& config, const flight::FlightConfig& logged,
   }
   if (key == kFactor) {
     if (std::isfinite(config.slow_down.at_s))
-      throw InputError(
-          fmt::format("--what-if: {}: must not be changed in a flight that was slowed down itself", kFactor));
+      throw InputError(fmt::format(
+          "--what-if: {}: must be given once, and not in a flight that was slowed down itself", kFactor));
     config.slow_down = {at_s, input::number_of("--what-if: cpu.slow_down_factor", text, 0.1, 100.0)};
     return;
   }
@@ -83,7 +85,15 @@ void change_in_flight(MissionConfig& config, const flight::FlightConfig& logged,
     if (known == key) throw InputError(fmt::format("--what-if: {}: must be given once", key));
   config.change.at_s = at_s;
   config.change.to.emplace_back(key, input::number_of(("--what-if: " + key).c_str(), text, -1e9, 1e9));
-  try {
+}
+
+}  // namespace
+
+void change_in_flight(MissionConfig& config, const flight::FlightConfig& logged, double at_s,
+                      const std::vector<std::string>& settings) {
+  for (const std::string& setting : settings) change_one(config, logged, at_s, setting);
+  if (config.change.empty()) return;
+  try {  // all together: each alone may go with none of the logged ones
     (void)changed(flight::governor_config(logged), config.change);
   } catch (const InputError& error) {
     throw InputError(fmt::format("--what-if: {}", error.what()));

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "platform/flight/flight_config.hpp"
 #include "platform/mission/mission_config.hpp"
@@ -10,10 +11,10 @@
 
 namespace roborun::mission {
 
-/// "KEY=VALUE" from `at_s` on in the flight `logged`: a key of kGovernorKeys; cpu.slow_down_factor; flight.time_limit_s; goal=X,Y,Z.
+/// Each "KEY=VALUE", all together, from `at_s` on in the flight `logged`: a key of kGovernorKeys; cpu.slow_down_factor; flight.time_limit_s; goal=X,Y,Z.
 /// Throws InputError that names the key, and says which there are.
 void change_in_flight(MissionConfig& config, const flight::FlightConfig& logged, double at_s,
-                      const std::string& setting);
+                      const std::vector<std::string>& settings);
 /// Every key of change_in_flight(): for help texts.
 [[nodiscard]] std::string keys_in_flight();
 

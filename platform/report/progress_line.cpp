@@ -12,7 +12,7 @@ ProgressLine::ProgressLine() : terminal_(isatty(STDERR_FILENO) != 0), start_(Clo
 ProgressLine::~ProgressLine() { clear(); }
 
 void ProgressLine::clear() {
-  if (terminal_ && shown_) fmt::print(stderr, "\r{:90}\r", "");
+  if (terminal_ && shown_) (void)std::fputs(fmt::format("\r{:90}\r", "").c_str(), stderr);
   shown_ = false;
 }
 
@@ -24,7 +24,9 @@ void ProgressLine::show(const std::string& text) {
   if (!due()) return;
   last_ = Clock::now();
   shown_ = true;
-  fmt::print(stderr, "{}{}{}", terminal_ ? "\r" : "", text, terminal_ ? "   " : "\n");
+  // What cannot be written is left out: the work goes on.
+  (void)std::fputs(fmt::format("{}{}{}", terminal_ ? "\r" : "", text, terminal_ ? "   " : "\n").c_str(),
+                   stderr);
 }
 
 double ProgressLine::elapsed_s() const {

@@ -9,6 +9,12 @@
 namespace roborun::report {
 namespace {
 
+/// What cannot be written, to a terminal that went or a disk that is full, is left out: a flight hangs on who says it.
+void write(std::FILE* to, const std::string& text) {
+  (void)std::fputs(text.c_str(), to);
+  (void)std::fflush(to);
+}
+
 /// A terminal that moves its cursor.
 bool is_screen(std::FILE* file) {
   const char* const kind = std::getenv("TERM");
@@ -20,9 +26,7 @@ bool is_screen(std::FILE* file) {
 StatusScreen::StatusScreen(std::FILE* to) : to_(to), terminal_(is_screen(to)), last_(Clock::now()) {}
 
 StatusScreen::~StatusScreen() {
-  if (shown_ == 0) return;
-  fmt::print(to_, "\x1b[{}A\x1b[J", shown_);
-  (void)std::fflush(to_);
+  if (shown_ > 0) write(to_, fmt::format("\x1b[{}A\x1b[J", shown_));
 }
 
 bool StatusScreen::due() const {
@@ -43,8 +47,7 @@ void StatusScreen::show(const std::vector<Row>& rows) {
     shown_ = rows.size();
   else
     text += "\n";
-  fmt::print(to_, "{}", text);
-  (void)std::fflush(to_);
+  write(to_, text);
 }
 
 }  // namespace roborun::report

@@ -41,9 +41,8 @@ dds_entity_t DdsNode::topic_of(const std::string& topic, const dds_topic_descrip
   return checked(dds_create_topic(participant_, &type, ("rt" + topic).c_str(), nullptr, nullptr), topic);
 }
 
-dds_entity_t DdsNode::reader(const std::string& topic, const dds_topic_descriptor_t& type) {
-  constexpr std::int32_t kDepth = 5;
-  const Qos qos = qos_of(DDS_RELIABILITY_BEST_EFFORT, DDS_DURABILITY_VOLATILE, kDepth);
+dds_entity_t DdsNode::reader(const std::string& topic, const dds_topic_descriptor_t& type, int depth) {
+  const Qos qos = qos_of(DDS_RELIABILITY_BEST_EFFORT, DDS_DURABILITY_VOLATILE, depth);
   const dds_entity_t reader =
       checked(dds_create_reader(participant_, topic_of(topic, type), qos.get(), nullptr), topic);
   const dds_entity_t condition = checked(dds_create_readcondition(reader, DDS_ANY_STATE), topic);

@@ -15,8 +15,8 @@ class DdsNode {
   DdsNode(const DdsNode&) = delete;
   DdsNode& operator=(const DdsNode&) = delete;
 
-  /// `topic` by its ROS name. Hears publishers of every quality of service: best effort, volatile, the newest five.
-  [[nodiscard]] dds_entity_t reader(const std::string& topic, const dds_topic_descriptor_t& type);
+  /// `topic` by its ROS name. Hears publishers of every quality of service: best effort, volatile; the newest `depth` wait.
+  [[nodiscard]] dds_entity_t reader(const std::string& topic, const dds_topic_descriptor_t& type, int depth);
   /// Heard by subscribers that are reliable or not; `is_latched`: who comes late gets the last message.
   [[nodiscard]] dds_entity_t writer(const std::string& topic, const dds_topic_descriptor_t& type,
                                     bool is_latched);

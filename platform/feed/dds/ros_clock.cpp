@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <time.h>
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -36,7 +37,7 @@ std::optional<Refused> RosClock::take(std::int32_t sec, std::uint32_t nanosec, c
                    fmt::format("its stamp is {:.3f} s {} this machine's clock: must be of the same clock "
                                "(no use_sim_time; other machines synchronised)",
                                seconds(age > Nanos{0} ? age : -age), age > Nanos{0} ? "behind" : "ahead of")};
-  stamp_ns = (stamp + offset).count();
+  stamp_ns = std::min(stamp + offset, now.monotonic).count();  // of the future nothing is known
   return std::nullopt;
 }
 

@@ -17,6 +17,7 @@ constexpr std::uint32_t kLeastSide = 8, kMostSide = 1280;  // what a port takes
 /// Of a coefficient of distortion: less moves the corner of an image by less than a pixel.
 constexpr double kMostDistortion = 1e-3;
 constexpr double kMostSweep_s = 1.0;
+constexpr double kUnknownSpeed_m2ps2 = 1e6;  // of no weight beside anything
 
 /// What somebody else wrote, short and printable.
 std::string quoted(const char* text) {
@@ -174,6 +175,8 @@ std::optional<Refused> cloud_of(const RosCloud& cloud, std::size_t most_points,
   const Field time = time_of(cloud);
   const double stamp_s = cloud.header.stamp.sec + 1e-9 * cloud.header.stamp.nanosec;
   points.clear();
+  late_s = 0.0;
+  if (count == 0) return std::nullopt;  // whatever it says of rows
   double latest_s = -kMostSweep_s;
   for (std::uint32_t row = 0; row < cloud.height; ++row)
     for (std::uint32_t column = 0; column < cloud.width; ++column) {
@@ -223,6 +226,8 @@ std::optional<Refused> odometry_of(const RosOdometry& message, roborun_port_odom
     return Refused{"covariance", "a variance is negative or not finite"};
   if (std::all_of(variance.begin(), variance.begin() + 6, [](double x) { return x == 0.0; }))
     return Refused{"covariance", "the covariance of its pose is all zero, which says unknown"};
+  if (std::all_of(variance.begin() + 6, variance.end(), [](double x) { return x == 0.0; }))
+    std::fill(variance.begin() + 6, variance.end(), kUnknownSpeed_m2ps2);
   q_OB.normalize();
   const Vector3 v_O = q_OB * Vector3(v.x, v.y, v.z);
   std::copy_n(values.begin(), 3, odometry.p_OB_m);

@@ -12,6 +12,8 @@ constexpr Nanos kSilent{500'000'000};
 constexpr Nanos kMissed{5'000'000'000};
 constexpr std::uint32_t kPictureSlots = 4;
 constexpr std::uint32_t kSampleSlots = 1024;
+// What waits while another topic is served.
+constexpr int kPicturesDeep = 10, kSamplesDeep = 1024;
 
 roborun_port_mount mount_of(const DdsEye& eye) { return sensor_port::port_mount({eye.R_BC, eye.p_BC_m}); }
 
@@ -31,8 +33,8 @@ SensorFeed::SensorFeed(DdsNode& node, const DdsConfig& config, std::function<voi
   if (!config.odometry.empty()) add_odometry(config);
 }
 
-void SensorFeed::hear(const std::string& name, const dds_topic_descriptor_t& type, Take take) {
-  topics_.push_back({name, node_.reader(name, type), std::move(take)});
+void SensorFeed::hear(const std::string& name, const dds_topic_descriptor_t& type, int depth, Take take) {
+  topics_.push_back({name, node_.reader(name, type, depth), std::move(take)});
 }
 
 void SensorFeed::add_camera(const DdsEye& eye) {
@@ -41,13 +43,13 @@ void SensorFeed::add_camera(const DdsEye& eye) {
   camera.header.range_min_m = static_cast<float>(eye.range_min_m);
   camera.header.range_m = static_cast<float>(eye.range_m);
   camera.header.mount = mount_of(eye);
-  hear(eye.info, sensor_msgs_msg_dds__CameraInfo__desc, [&camera](const Message& message) {
+  hear(eye.info, sensor_msgs_msg_dds__CameraInfo__desc, kPicturesDeep, [&camera](const Message& message) {
     RosOptics optics;
     auto refused = optics_of(*static_cast<const RosCameraInfo*>(message.content), optics);
     if (!refused) camera.optics = optics;
     return refused;
   });
-  hear(eye.topic, sensor_msgs_msg_dds__Image__desc,
+  hear(eye.topic, sensor_msgs_msg_dds__Image__desc, kPicturesDeep,
        [this, &camera](const Message& message) { return write_image(camera, message); });
 }
 
@@ -73,7 +75,7 @@ void SensorFeed::add_lidar(const DdsEye& eye) {
   lidar.header.mount = mount_of(eye);
   sensor_port::open_port(lidar.port, eye.port, ROBORUN_PORT_CLOUD,
                          sizeof(roborun_port_point) * eye.most_points, kPictureSlots);
-  hear(eye.topic, sensor_msgs_msg_dds__PointCloud2__desc,
+  hear(eye.topic, sensor_msgs_msg_dds__PointCloud2__desc, kPicturesDeep,
        [this, &lidar](const Message& message) { return write_cloud(lidar, message); });
 }
 
@@ -82,7 +84,11 @@ std::optional<Refused> SensorFeed::write_cloud(Lidar& lidar, const Message& mess
   double late_s = 0.0;
   if (auto refused = stamp(cloud, message, lidar.header.at)) return refused;
   if (auto refused = cloud_of(cloud, lidar.eye.most_points, lidar.points, late_s)) return refused;
-  lidar.header.at.stamp_ns += from_seconds(late_s).count();
+  const Nanos ahead = Nanos{lidar.header.at.stamp_ns} + from_seconds(late_s) - message.now.monotonic;
+  if (ahead > RosClock::kMostAhead)
+    return Refused{"stamp",
+                   fmt::format("its last point is {:.3f} s ahead of this machine's clock", seconds(ahead))};
+  lidar.header.at.stamp_ns = (message.now.monotonic + std::min(ahead, Nanos{0})).count();
   lidar.header.points = static_cast<std::uint32_t>(lidar.points.size());
   lidar.port.write(lidar.header, std::as_bytes(std::span(lidar.points)));
   return std::nullopt;
@@ -90,7 +96,7 @@ std::optional<Refused> SensorFeed::write_cloud(Lidar& lidar, const Message& mess
 
 void SensorFeed::add_imu(const DdsConfig& config) {
   sensor_port::open_port(imu_port_, config.imu_port, ROBORUN_PORT_IMU, 0, kSampleSlots);
-  hear(config.imu, sensor_msgs_msg_dds__Imu__desc, [this](const Message& message) {
+  hear(config.imu, sensor_msgs_msg_dds__Imu__desc, kSamplesDeep, [this](const Message& message) {
     const auto& imu = *static_cast<const RosImu*>(message.content);
     auto refused = stamp(imu, message, imu_.at);
     if (!refused) refused = imu_of(imu, imu_);
@@ -101,7 +107,7 @@ void SensorFeed::add_imu(const DdsConfig& config) {
 
 void SensorFeed::add_odometry(const DdsConfig& config) {
   sensor_port::open_port(odometry_port_, config.odometry_port, ROBORUN_PORT_ODOMETRY, 0, kSampleSlots);
-  hear(config.odometry, nav_msgs_msg_dds__Odometry__desc, [this](const Message& message) {
+  hear(config.odometry, nav_msgs_msg_dds__Odometry__desc, kSamplesDeep, [this](const Message& message) {
     const auto& odometry = *static_cast<const RosOdometry*>(message.content);
     odometry_.reset_counter += message.is_new_sender ? 1 : 0;  // another one, or again: its frame begins anew
     auto refused = stamp(odometry, message, odometry_.at);

@@ -73,7 +73,7 @@ class SensorFeed {
     std::vector<roborun_port_point> points{};
   };
 
-  void hear(const std::string& name, const dds_topic_descriptor_t& type, Take take);
+  void hear(const std::string& name, const dds_topic_descriptor_t& type, int depth, Take take);
   void add_camera(const DdsEye& eye);
   void add_lidar(const DdsEye& eye);
   void add_imu(const DdsConfig& config);

@@ -33,7 +33,7 @@ template <typename Ros>
 class Heard {
  public:
   Heard(DdsNode& node, const std::string& topic, const dds_topic_descriptor_t& type)
-      : reader_(node.reader(topic, type)) {}
+      : reader_(node.reader(topic, type, 10)) {}
   ~Heard() { release(); }
   Heard(const Heard&) = delete;
   Heard& operator=(const Heard&) = delete;

@@ -251,6 +251,11 @@ TEST(RosSamples, OdometryThatIsNoneIsRefused) {
   EXPECT_EQ(with([](Odometry& o) { o.message.twist.twist.linear.z = kNaN; }), "values");
   EXPECT_EQ(with([](Odometry& o) { o.message.pose.covariance[7] = -0.1; }), "covariance");
   EXPECT_EQ(with([](Odometry& o) { o.message.twist.covariance[0] = kNaN; }), "covariance");
+  Odometry still;  // whose speed is unknown: nothing is believed of it
+  for (double& c : still.message.twist.covariance) c = 0.0;
+  roborun_port_odometry at{};
+  ASSERT_FALSE(odometry_of(still.message, at));
+  for (const float variance : at.velocity_variance) EXPECT_GE(variance, 1e6F);
   EXPECT_EQ(with([](Odometry& o) {
               for (double& c : o.message.pose.covariance) c = 0.0;
             }),

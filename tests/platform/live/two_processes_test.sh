@@ -74,14 +74,14 @@ switches_off_when_the_plant_stops() {
   ends 1 $run && is terminated run reason && ends 1 $plant && is collision plant reason
 }
 # The motors' controllers stop by themselves when nobody commands, and what was in the air falls.
-# All of its threads live with what a flight needs: no capability but three, no new privileges, a filter of system calls.
+# All of its threads live with what a flight needs: no capability but five, no new privileges, a filter of system calls.
 falls_without_a_runtime() {
   start
   flown 9
   local file kept no_more filter
   for file in /proc/$run/task/*/status; do
     read -r kept no_more filter < <(awk '/^(CapEff|NoNewPrivs|Seccomp):/ { printf "%s ", $2 }' "$file")
-    (((0x$kept & ~0x804002) == 0 && no_more == 1 && filter == 2)) || { echo "not confined: $file: $kept $no_more $filter"; return 1; }
+    (((0x$kept & ~0x80400b) == 0 && no_more == 1 && filter == 2)) || { echo "not confined: $file: $kept $no_more $filter"; return 1; }
   done
   kill -KILL $run
   ends 1 $plant && is collision plant reason && is True plant collided

@@ -44,7 +44,7 @@ class WhatIf : public ::testing::Test {
   std::string refusal(const std::string& setting) {
     MissionConfig config = config_;
     try {
-      change_in_flight(config, flown(), kChange_s, setting);
+      change_in_flight(config, flown(), kChange_s, {setting});
     } catch (const InputError& error) {
       return error.what();
     }
@@ -58,7 +58,7 @@ class WhatIf : public ::testing::Test {
 TEST_F(WhatIf, IsTheSameFlightUntilThenAndAnotherOneAfterIt) {
   const std::string logged = fly(config_, "logged.mcap");
   MissionConfig slow = config_;
-  change_in_flight(slow, flown(), kChange_s, "flight.v_max_mps=0.5");
+  change_in_flight(slow, flown(), kChange_s, {"flight.v_max_mps=0.5"});
   const std::string changed = fly(slow, "changed.mcap");
   EXPECT_EQ(first_difference(logged, changed, kChange_s), std::nullopt);
   const auto difference = first_difference(logged, changed, 1e6);
@@ -76,8 +76,7 @@ TEST_F(WhatIf, IsTheSameFlightUntilThenAndAnotherOneAfterIt) {
 
 TEST_F(WhatIf, IsReplayedWithItsChange) {
   MissionConfig slow = config_;
-  change_in_flight(slow, flown(), kChange_s, "flight.v_max_mps=0.5");
-  change_in_flight(slow, flown(), kChange_s, "cpu.slow_down_factor=3");
+  change_in_flight(slow, flown(), kChange_s, {"flight.v_max_mps=0.5", "cpu.slow_down_factor=3"});
   const ReplayResult r = replay_flight(fly(slow, "changed.mcap"), {});
   EXPECT_TRUE(r.same()) << (r.difference ? r.difference->what : r.damage);
   EXPECT_NE(r.replayed.digest, 0U);
@@ -92,12 +91,24 @@ TEST_F(WhatIf, FindsAnotherFlight) {
   EXPECT_NE(difference->find(" sample: another one"), std::string::npos) << *difference;
 }
 
+TEST_F(WhatIf, TakesSettingsTogetherInAnyOrder) {
+  for (const std::vector<std::string>& settings :
+       {std::vector<std::string>{"governor.longest_s=0.1", "governor.shortest_s=0.05"},
+        std::vector<std::string>{"governor.shortest_s=0.05", "governor.longest_s=0.1"}}) {
+    MissionConfig config = config_;
+    EXPECT_NO_THROW(change_in_flight(config, flown(), kChange_s, settings));
+    EXPECT_EQ(config.change.to.size(), 2U);
+  }
+  // Alone it goes below what is left of the other one.
+  EXPECT_NE(refusal("governor.longest_s=0.1"), "");
+}
+
 TEST_F(WhatIf, GivesAGoalThen) {
   MissionConfig config = config_;
   config.goals.push_back({2.0, {world_.goal_W()}});
   config.goals.push_back({12.0, {world_.goal_W()}});
   const Vector3 p_W = world_.start_W();
-  change_in_flight(config, flown(), kChange_s, fmt::format("goal={},{},{}", p_W.x(), p_W.y(), p_W.z()));
+  change_in_flight(config, flown(), kChange_s, {fmt::format("goal={},{},{}", p_W.x(), p_W.y(), p_W.z())});
   ASSERT_EQ(config.goals.size(), 3U);
   EXPECT_EQ(config.goals[1].at_s, kChange_s);
   EXPECT_EQ(config.goals[1].goals_W.front(), p_W);
