@@ -171,16 +171,6 @@ TEST(SixCamerasWithHoles, SeeAheadInCellsThatAreSeenWhole) {
     if (d.speed_mps > 1.0 && d.planner_status != "not ready") visible_m.push_back(d.visible_m);
   ASSERT_GT(visible_m.size(), 10U);
   std::sort(visible_m.begin(), visible_m.end());
-  // Of what is in view holes are a part, which the map's work was planned for: standing, nothing waits for that time.
-  double most_idle_s = 0.0;
-  int standing = 0;
-  for (const report::DecisionRecord& d : flown.decisions) {
-    if (d.planner_status == "not ready" || d.speed_mps > 0.1 || d.deadline_s < 2.0) continue;
-    ++standing;
-    most_idle_s = std::max(most_idle_s, d.deadline_s - d.latency_s);
-  }
-  EXPECT_GT(standing, 0);
-  EXPECT_LT(most_idle_s, 1.6) << "2.3 without hasten()";
   const double median_m = visible_m[visible_m.size() / 2];
   std::printf("%s after %.0f s, %.0f m; visible %.1f m\n", flown.result.reason.c_str(),
               flown.result.mission_time_s, flown.result.distance_m, median_m);
