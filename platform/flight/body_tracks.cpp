@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "core/geometry/math.hpp"
 #include "platform/flight/surface_middle.hpp"
@@ -42,11 +41,6 @@ bool BodyTracks::is_sure(const Track& track, MonotonicTime now) noexcept {
   return track.sightings >= kSure && now - track.seen <= kLasts && track.v_W.norm() > kMoves_mps;
 }
 
-bool BodyTracks::is_followed(const Track& track, MonotonicTime now) noexcept {
-  if (track.sightings == 0 || now - track.seen > kLasts) return false;
-  return track.sightings < kProbation || now - track.moved <= kLasts;
-}
-
 BodyTracks::Track* BodyTracks::continued_by(const Vector3& place_W, MonotonicTime now) noexcept {
   Track* nearest = nullptr;
   double nearest_m = 0.0;
@@ -63,13 +57,11 @@ BodyTracks::Track* BodyTracks::continued_by(const Vector3& place_W, MonotonicTim
 }
 
 void BodyTracks::begin(const Vector3& place_W, MonotonicTime now) noexcept {
-  const auto worth = [now](const Track& track) {
-    const bool moves = track.sightings >= kSure && now - track.moved <= kLasts;
-    return std::pair((track.sightings > 0 ? 1 : 0) + (moves ? 1 : 0), track.seen);
-  };
-  Track& least = *std::min_element(track_.begin(), track_.end(),
-                                   [&](const Track& a, const Track& b) { return worth(a) < worth(b); });
-  least = {.p_W = place_W, .seen = now, .sightings = 1};
+  Track& oldest = *std::min_element(track_.begin(), track_.end(), [](const Track& a, const Track& b) {
+    return (a.sightings > 0 ? 1 : 0) < (b.sightings > 0 ? 1 : 0) ||
+           ((a.sightings > 0) == (b.sightings > 0) && a.seen < b.seen);
+  });
+  oldest = {place_W, Vector3::Zero(), now, 1};
 }
 
 void BodyTracks::observe(MonotonicTime now, std::span<const Vector3> places_W) noexcept {
@@ -97,12 +89,12 @@ void BodyTracks::see(Track& track, const Vector3& place_W, MonotonicTime now) no
   track.p_W = expected_W + (track.sightings == 1 ? 1.0 : kPositionGain) * residual;
   track.seen = now;
   ++track.sightings;
-  if (is_sure(track, now)) track.moved = now;
 }
 
 void BodyTracks::follow(MonotonicTime now, std::span<const stages::CloudPoint> points) noexcept {
   for (Track& track : track_) {
-    if (track.seen >= now || !is_followed(track, now)) continue;
+    const bool is_new = track.sightings > 0 && track.sightings < kProbation && now - track.seen <= kLasts;
+    if (track.seen >= now || !(is_new || is_sure(track, now))) continue;
     const auto middle_W = surface_middle_W(at_W(track, now), points);
     if (middle_W) see(track, *middle_W, now);
   }
