@@ -26,7 +26,7 @@
 #include "platform/input/output_file.hpp"
 #include "platform/input/stop_signal.hpp"
 #include "platform/log/flight_log.hpp"
-#include "platform/mission/flight_end.hpp"
+#include "platform/mission/logged_end.hpp"
 #include "platform/mission/mission.hpp"
 #include "platform/mission/replay.hpp"
 #include "platform/mission/what_if.hpp"
@@ -61,11 +61,11 @@ nlohmann::ordered_json json_of(const mission::ReplayResult& r) {
 }
 
 /// A moment behind the end of the log.
-void refuse_beyond(const ReplayOptions& options) {
+void refuse_beyond(const ReplayOptions& options, const mission::LoggedEnd& logged) {
   if (options.from_s > options.until_s)
     throw InputError(
         fmt::format("--from: {:g} s: must not be behind --until {:g} s", options.from_s, options.until_s));
-  const std::string why = mission::beyond(mission::end_of(options.file), "--from", options.from_s);
+  const std::string why = mission::beyond(logged, "--from", options.from_s);
   if (!why.empty()) throw InputError(fmt::format("{}: {}", options.file, why));
 }
 
@@ -87,7 +87,7 @@ void print_replay(const mission::ReplayResult& r) {
 
 int replay(const ReplayOptions& options) {
   const bool from = options.from_s >= 0.0;
-  if (from) refuse_beyond(options);
+  if (from) refuse_beyond(options, mission::end_of(options.file));
   nlohmann::ordered_json decisions = nlohmann::ordered_json::array();
   const auto decided = [&](const log::DecisionEntry& entry) {
     if (seconds(Nanos{entry.time_ns}) < options.from_s) return;
@@ -137,7 +137,7 @@ class TemporaryLog {
   std::string path_;
 };
 
-nlohmann::ordered_json json_of(const mission::FlightEnd& end) {
+nlohmann::ordered_json json_of(const mission::LoggedEnd& end) {
   nlohmann::ordered_json j = {{"reached_goal", nullptr}, {"collided", nullptr}};
   if (end.has_result) j = {{"reached_goal", end.reached}, {"collided", end.collided}};
   j["reason"] = end.reason;
@@ -150,7 +150,7 @@ nlohmann::ordered_json json_of(const mission::FlightEnd& end) {
   return j;
 }
 
-std::string table_of(const mission::FlightEnd& logged, const mission::FlightEnd& flown) {
+std::string table_of(const mission::LoggedEnd& logged, const mission::LoggedEnd& flown) {
   const auto number = [](double x) { return std::isfinite(x) ? fmt::format("{:.2f}", x) : std::string("-"); };
   const auto row = [&](const char* name, double a, double b) {
     return fmt::format("{:<22} {:>14} {:>14} {:>10}\n", name, number(a), number(b),
@@ -166,8 +166,8 @@ std::string table_of(const mission::FlightEnd& logged, const mission::FlightEnd&
 
 int what_if(const ReplayOptions& options) {
   PreparedFlight flight = prepare_again(options.file);
-  refuse_beyond(options);
-  const mission::FlightEnd logged = mission::end_of(options.file);
+  const mission::LoggedEnd logged = mission::end_of(options.file);
+  refuse_beyond(options, logged);
   const flight::FlightConfig as_logged = mission::Recording(options.file).flight().flight;
   mission::change_in_flight(flight.config, as_logged, options.from_s, options.what_if);
   flight.inputs.push_back(options.file);
@@ -197,7 +197,7 @@ int what_if(const ReplayOptions& options) {
                options.file, options.from_s, *difference);
     return kNotGood;
   }
-  const mission::FlightEnd flown = mission::end_of(flight.config.log);
+  const mission::LoggedEnd flown = mission::end_of(flight.config.log);
   if (!logged.damage.empty()) fmt::print(stderr, "roborun: {}\n", logged.damage);
   if (options.json) {
     fmt::print("{}\n", nlohmann::ordered_json{{"from_s", options.from_s},

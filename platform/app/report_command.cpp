@@ -17,8 +17,8 @@
 #include "platform/input/output_file.hpp"
 #include "platform/input/stop_signal.hpp"
 #include "platform/input/text_file.hpp"
-#include "platform/mission/flight_end.hpp"
 #include "platform/mission/flight_story.hpp"
+#include "platform/mission/logged_end.hpp"
 #include "platform/mission/scene.hpp"
 #include "platform/report/folder_page.hpp"
 #include "platform/report/result_line.hpp"
@@ -58,7 +58,7 @@ void print_page(const std::string& path, const std::string& html) {
   fmt::print("page: {} ({:.2f} MB)\n", path, 1e-6 * static_cast<double>(html.size()));
 }
 
-report::FolderRow row_of(const std::string& name, const mission::FlightEnd& end) {
+report::FolderRow row_of(const std::string& name, const mission::LoggedEnd& end) {
   using Verdict = report::FolderRow::Verdict;
   return {name,
           "",

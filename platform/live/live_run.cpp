@@ -46,6 +46,7 @@ rt::LaneSetConfig lane_config(const LiveConfig& config) {
   rt::LaneSetConfig lanes;
   lanes.minor_frame = config.flight.minor_frame;
   lanes.best_effort = config.best_effort;
+  lanes.confine = config.confine;
   return lanes;
 }
 
@@ -131,7 +132,6 @@ class LiveRun {
   FlightEnd end_;
   std::optional<RouteFlight> route_;
   bool follows_route_{false};
-  std::string not_confined_;
   Ground ground_;
   std::string told_need_;
   governor::Phase told_phase_{governor::Phase::kGround};
@@ -188,10 +188,7 @@ void LiveRun::start() {
     flight_.log_to(*log_thread_, first_release_);
     decisions_.log_to(*log_thread_, first_release_, flight::lattice_of(config_.flight));
   }
-  std::string error = lanes_.start();
-  if (error.empty() && config_.confine) not_confined_ = config_.confine();
-  if (!not_confined_.empty() && !config_.best_effort)
-    error = not_confined_ + " (--best-effort runs on without)";
+  const std::string error = lanes_.start();
   if (error.empty()) return;
   lanes_.stop();
   throw InputError(error);
@@ -338,7 +335,6 @@ void LiveRun::fill() {
   report_.goals_given = ground_.given();
   report_.goals_refused = ground_.refused();
   report_.missing = lanes_.missing();
-  if (!not_confined_.empty()) report_.missing.push_back(not_confined_);
   for (const flight::FailsafeEvent& e : system_.pilot().events())
     report_.events.push_back(
         {seconds(e.time - first_release_), governor::to_string(e.action), words_of(e.conditions)});

@@ -38,8 +38,7 @@ struct LiveConfig {
   std::string log{};         ///< File for the log of the flight; empty: none. It does not replay.
   log::LogViewer* viewer{};  ///< Of that log; may be null, outlives the flight.
   bool best_effort{false};   ///< As rt::LaneSetConfig.
-  /// Called once the lanes run, as rt::confine(); what it says is missing. May be empty.
-  std::function<std::string()> confine{};
+  std::function<std::string()> confine{};  ///< As rt::LaneSetConfig.
   std::function<bool()> stop{};  ///< Asked twenty times a second: true: it lands where it is. May be empty.
 };
 

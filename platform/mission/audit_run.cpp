@@ -275,6 +275,7 @@ rt::LaneSetConfig lane_config(const RealTimeConfig& config) {
   lanes.minor_frame = config.mission.flight.minor_frame;
   lanes.seal = config.seal;
   lanes.best_effort = config.best_effort;
+  lanes.confine = config.confine;
   lanes.trace = true;
   if (config.mission.backends == board::BackendNames{} && config.mission.own.empty())
     lanes.unneeded_libraries = kBaselineLibraries;
@@ -326,7 +327,6 @@ class RealTimeRun {
   std::array<Injected, core::kLaneCount> program_;
   std::array<Noted, core::kLaneCount> noted_;
   rt::LaneSet lanes_;
-  std::string not_confined_;
   Evidence evidence_;
   MonotonicTime first_release_{};
 };
@@ -367,10 +367,7 @@ void RealTimeRun::start() {
   first_release_ = lanes_.choose_first_release();
   aircraft_.start(first_release_ - flight_config_.minor_frame);
   begin_log();
-  std::string error = lanes_.start();
-  if (error.empty() && config_.confine) not_confined_ = config_.confine();
-  if (!not_confined_.empty() && !config_.best_effort)
-    error = not_confined_ + " (--best-effort runs on without)";
+  const std::string error = lanes_.start();
   if (error.empty()) return;
   stop();
   throw InputError(error);
@@ -585,7 +582,6 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
   const rt::IdleLatencyHold idle;
   fly(progress, report);
   report.missing = lanes_.missing();
-  if (!not_confined_.empty()) report.missing.push_back(not_confined_);
   report.best_effort = !report.missing.empty();
   report.load = config_.load;
   report.rate_Hz = 1.0 / seconds(flight_config_.minor_frame);

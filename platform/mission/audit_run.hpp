@@ -32,8 +32,7 @@ struct RealTimeConfig {
   bool load{false};   ///< stress-ng on all CPUs meanwhile.
   bool trace{false};  ///< Keep every frame and slot: traced_bytes(), at most kMostTraced_bytes.
   std::optional<Injection> inject{};
-  /// Called once the lanes run, as rt::confine(); what it says is missing. May be empty.
-  std::function<std::string()> confine{};
+  std::function<std::string()> confine{};  ///< As rt::LaneSetConfig.
   std::function<bool()> stop{};  ///< Asked twenty times a second: true ends the run early. May be empty.
   /// CAN interfaces of the kernel for the motors' bus: the vehicle's and the ESCs' (KernelMotorBus).
   std::optional<std::array<std::string, 2>> can{};

@@ -52,7 +52,11 @@ std::string LaneSet::start() {
     lane_[i].start(is_flight ? first_ : first_ + config_.minor_frame / 2, config_.minor_frame);
     if (std::string error = thread_[i].start(placement_[i], true); !error.empty()) return error;
   }
-  return {};
+  if (!config_.confine) return {};
+  const std::string why = config_.confine();
+  if (why.empty()) return {};
+  missing_.push_back(why);
+  return config_.best_effort ? std::string() : why + " (--best-effort runs on without)";
 }
 
 void LaneSet::stop() noexcept {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,7 +21,9 @@ struct LaneSetConfig {
   Nanos minor_frame{core::kMinorFrame};
   HeapSeal seal{HeapSeal::kCount};
   bool best_effort{false};  ///< Runs without what is missing.
-  bool trace{false};        ///< Every frame and slot is kept for drain_trace(), which is to be called often.
+  /// Called once all threads run: confine(), which says what is missing. May be empty.
+  std::function<std::string()> confine{};
+  bool trace{false};  ///< Every frame and slot is kept for drain_trace(), which is to be called often.
   /// Shared libraries whose pages are not needed locked: names as of unlock_libraries().
   std::span<const char* const> unneeded_libraries{};
 };
@@ -36,12 +39,13 @@ class LaneSet {
   /// Locks the memory. Empty if all is there that real time needs, or best_effort is on; otherwise one line
   /// that names all that is missing.
   [[nodiscard]] std::string prepare();
-  /// What prepare() found missing, one line each.
+  /// What prepare() and start() found missing, one line each.
   [[nodiscard]] const std::vector<std::string>& missing() const noexcept { return missing_; }
   /// The instant of the flight lane's first release: in whole minor frames, far enough ahead for all threads
   /// to be there.
   [[nodiscard]] MonotonicTime choose_first_release() noexcept;
-  /// Seals the heap and starts all threads. Empty, or why one of them could not be started: then stop().
+  /// Seals the heap, starts all threads and confines them. Empty, or why one of them could not be started or, without
+  /// best_effort, confined: then stop().
   [[nodiscard]] std::string start();
   /// Asks all lanes to end, waits for them, opens the heap and unlocks the memory. What happens after it is
   /// not watched. More than once is harmless.

@@ -63,6 +63,21 @@ std::string sha1(std::string text) {
 
 bool is_control(Opcode opcode) { return (static_cast<unsigned>(opcode) & 0x8U) != 0; }
 
+/// Of a frame, up to its mask or payload.
+void append_head(std::string& to, Opcode opcode, bool last, bool is_masked, std::size_t length) {
+  const unsigned mask = is_masked ? 0x80U : 0U;
+  to += static_cast<char>(static_cast<unsigned>(opcode) | (last ? 0x80U : 0U));
+  if (length < 126) {
+    to += static_cast<char>(mask | static_cast<unsigned>(length));
+  } else if (length < 65536) {
+    to += static_cast<char>(mask | 126U);
+    append_big_endian(to, length, 2);
+  } else {
+    to += static_cast<char>(mask | 127U);
+    append_big_endian(to, length, 8);
+  }
+}
+
 }  // namespace
 
 std::string accept_key(std::string_view key) {
@@ -70,28 +85,14 @@ std::string accept_key(std::string_view key) {
 }
 
 void append_frame(std::string& to, Opcode opcode, std::string_view payload) {
-  to += static_cast<char>(0x80U | static_cast<unsigned>(opcode));
-  if (payload.size() < 126) {
-    to += static_cast<char>(payload.size());
-  } else if (payload.size() < 65536) {
-    to += static_cast<char>(126);
-    append_big_endian(to, payload.size(), 2);
-  } else {
-    to += static_cast<char>(127);
-    append_big_endian(to, payload.size(), 8);
-  }
+  append_head(to, opcode, true, false, payload.size());
   to.append(payload);
 }
 
 std::string masked_frame(Opcode opcode, std::string_view payload, bool last) {
   const std::string key = "\x12\x34\x56\x78";
-  std::string frame(1, static_cast<char>(static_cast<unsigned>(opcode) | (last ? 0x80U : 0U)));
-  if (payload.size() < 126) {
-    frame += static_cast<char>(0x80U | payload.size());
-  } else {
-    frame += static_cast<char>(0x80U | 126U);
-    append_big_endian(frame, payload.size(), 2);
-  }
+  std::string frame;
+  append_head(frame, opcode, last, true, payload.size());
   frame += key;
   for (std::size_t i = 0; i < payload.size(); ++i)
     frame += static_cast<char>(payload[i] ^ key[i % key.size()]);

@@ -16,7 +16,7 @@ enum class Opcode : std::uint8_t { kContinue = 0, kText = 1, kBinary = 2, kClose
 /// Appends a whole message of the server.
 void append_frame(std::string& to, Opcode opcode, std::string_view payload);
 
-/// A message of a client, or a part of one that `last` does not end; of at most 65,535 bytes. The mask is always the same: it is there
+/// A message of a client, or a part of one that `last` does not end. The mask is always the same: it is there
 /// for proxies, and here are none.
 [[nodiscard]] std::string masked_frame(Opcode opcode, std::string_view payload, bool last = true);
 

@@ -15,7 +15,13 @@ constexpr std::uint32_t kSampleSlots = 1024;
 // What waits while another topic is served.
 constexpr int kPicturesDeep = 10, kSamplesDeep = 1024;
 
-roborun_port_mount mount_of(const DdsEye& eye) { return sensor_port::port_mount({eye.R_BC, eye.p_BC_m}); }
+/// What the vehicle file says of it; `header` is of a depth image or a cloud.
+template <typename Header>
+void put_eye(const DdsEye& eye, Header& header) {
+  header.range_min_m = static_cast<float>(eye.range_min_m);
+  header.range_m = static_cast<float>(eye.range_m);
+  header.mount = sensor_port::port_mount({eye.R_BC, eye.p_BC_m});
+}
 
 }  // namespace
 
@@ -40,9 +46,7 @@ void SensorFeed::hear(const std::string& name, const dds_topic_descriptor_t& typ
 void SensorFeed::add_camera(const DdsEye& eye) {
   Camera& camera = cameras_.emplace_back();
   camera.eye = eye;
-  camera.header.range_min_m = static_cast<float>(eye.range_min_m);
-  camera.header.range_m = static_cast<float>(eye.range_m);
-  camera.header.mount = mount_of(eye);
+  put_eye(eye, camera.header);
   hear(eye.info, sensor_msgs_msg_dds__CameraInfo__desc, kPicturesDeep, [&camera](const Message& message) {
     RosOptics optics;
     auto refused = optics_of(*static_cast<const RosCameraInfo*>(message.content), optics);
@@ -70,9 +74,7 @@ std::optional<Refused> SensorFeed::write_image(Camera& camera, const Message& me
 void SensorFeed::add_lidar(const DdsEye& eye) {
   Lidar& lidar = lidars_.emplace_back();
   lidar.eye = eye;
-  lidar.header.range_min_m = static_cast<float>(eye.range_min_m);
-  lidar.header.range_m = static_cast<float>(eye.range_m);
-  lidar.header.mount = mount_of(eye);
+  put_eye(eye, lidar.header);
   sensor_port::open_port(lidar.port, eye.port, ROBORUN_PORT_CLOUD,
                          sizeof(roborun_port_point) * eye.most_points, kPictureSlots);
   hear(eye.topic, sensor_msgs_msg_dds__PointCloud2__desc, kPicturesDeep,

@@ -1,16 +1,10 @@
 #!/usr/bin/env bash
 # manual_cli_test.sh ROBORUN: man pages and completions hold every command and option; --help keeps to the terminal's width.
 set -u
+. "$(dirname "$0")/../../support/checks.sh"
 roborun=$1
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
-failed=0
-passed=0
-check() {
-  local what=$1
-  shift
-  if "$@"; then passed=$((passed + 1)); else echo "FAILED $what"; failed=$((failed + 1)); fi
-}
 "$roborun" manual --out "$work/share" || exit 1
 pages=$work/share/man/man1
 bash=$work/share/bash-completion/completions/roborun

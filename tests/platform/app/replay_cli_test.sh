@@ -1,16 +1,12 @@
 #!/usr/bin/env bash
 # roborun replay --from, --what-if, and roborun report FOLDER, by what they print and write.
 set -u
+. "$(dirname "$0")/../../support/checks.sh"
 roborun=$1
 data=$2
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
-failed=0
-passed=0
-check() { # WHAT COMMAND...
-  if "${@:2}"; then passed=$((passed + 1)); else echo "FAILED: $1"; failed=$((failed + 1)); fi
-}
 exits() { # CODE COMMAND...
   local wanted=$1 code
   shift

@@ -2,18 +2,12 @@
 # What can be checked of platform/deploy without a board: the unit's command is one that this program takes, its limits hold
 # what the lanes ask for, systemd knows every key, and what the files and the README say is the same.
 set -u
+. "$(dirname "$0")/../../support/checks.sh"
 roborun=$1
 deploy=$2/deploy
 unit=$deploy/roborun-bench.service
 scratch=$(mktemp -d) || exit 1
 trap 'rm -rf "$scratch"' EXIT
-failed=0
-passed=0
-check() {
-  local what=$1
-  shift
-  if "$@"; then passed=$((passed + 1)); else echo "FAILED $what"; failed=$((failed + 1)); fi
-}
 of_unit() { sed -n "s/^$1=//p" "$unit"; }
 
 # The command with an interface that no machine has: its arguments are good if that interface is all that is refused.

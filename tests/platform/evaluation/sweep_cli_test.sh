@@ -2,16 +2,10 @@
 # roborun sweep: bad input gets one line and exit code 2 and leaves no folder; after Ctrl-C and after kill -9 the same
 # command goes on, and ends with the bytes of a run that was never stopped; --json ends with one JSON object.
 set -u
+. "$(dirname "$0")/../../support/checks.sh"
 roborun=$(realpath "$1") || exit 1
 folder=$(mktemp -d "${TMPDIR:-/tmp}/roborun_sweep_cli.XXXXXX") || exit 1
 trap 'rm -rf "$folder"' EXIT
-failed=0
-passed=0
-check() {
-  local name=$1
-  shift
-  if "$@"; then passed=$((passed + 1)); else echo "FAILED $name"; failed=$((failed + 1)); fi
-}
 refuses() {
   local wanted=$1 out err code
   shift

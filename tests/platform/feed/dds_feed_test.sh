@@ -1,18 +1,15 @@
 #!/usr/bin/env bash
 # roborun feed dds hears another process on loopback. usage: dds_feed_test.sh ROBORUN PUBLISHER ROOT
 set -uo pipefail
+. "$(dirname "$0")/../../support/checks.sh"
 roborun=$1 publisher=$2 root=$3
 name=test-dds-$$
 export ROS_DOMAIN_ID=$((1 + $$ % 200))
 # Loopback alone, without multicast.
 export CYCLONEDDS_URI='<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces><AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer Address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
-failed=0 passed=0
 children=()
 work=$(mktemp -d)
 trap 'kill "${children[@]}" 2>/dev/null; rm -rf "$work" /dev/shm/roborun-"$name"*' EXIT
-check() {  # NAME COMMAND..
-  if "${@:2}"; then passed=$((passed + 1)); else echo "FAILED $1"; failed=$((failed + 1)); fi
-}
 says() {  # CODE TEXT COMMAND..
   local wanted=$1 text=$2 out code
   shift 2

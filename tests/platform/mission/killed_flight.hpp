@@ -15,7 +15,7 @@
 #include <thread>
 
 #include "platform/board/board_profile.hpp"
-#include "platform/mission/flight_end.hpp"
+#include "platform/mission/logged_end.hpp"
 #include "platform/mission/mission.hpp"
 #include "platform/mission/replay.hpp"
 #include "platform/sitl/world/world_file.hpp"

@@ -12,7 +12,7 @@
 #include "platform/board/board_profile.hpp"
 #include "platform/flight/flight_system.hpp"
 #include "platform/input/input_error.hpp"
-#include "platform/mission/flight_end.hpp"
+#include "platform/mission/logged_end.hpp"
 #include "platform/mission/mission.hpp"
 #include "platform/mission/replay.hpp"
 #include "platform/mission/setting_change.hpp"
@@ -149,7 +149,7 @@ TEST_F(WhatIf, EveryKeyOfTheGovernorKeepsItsOwnValue) {
 
 TEST_F(WhatIf, ReadsTheEndOfAFlight) {
   const std::string path = fly(config_, "logged.mcap");
-  const FlightEnd end = end_of(path);
+  const LoggedEnd end = end_of(path);
   EXPECT_TRUE(end.has_result);
   EXPECT_EQ(end.reason, report_.result.reason);
   EXPECT_EQ(end.reached, report_.result.reached_goal);
@@ -164,7 +164,7 @@ TEST_F(WhatIf, ReadsTheEndOfAFlight) {
   EXPECT_NE(beyond(end, "--from", end.time_s + 1.0).find("must be within the log"), std::string::npos);
   std::ifstream file(path, std::ios::binary);
   const std::string whole{std::istreambuf_iterator<char>(file), {}};
-  const FlightEnd cut = end_of(test::scratch_file("cut.mcap", whole.substr(0, whole.size() / 2)));
+  const LoggedEnd cut = end_of(test::scratch_file("cut.mcap", whole.substr(0, whole.size() / 2)));
   EXPECT_FALSE(cut.has_result);
   EXPECT_FALSE(cut.good());
   EXPECT_LT(cut.recorded_s, end.time_s);

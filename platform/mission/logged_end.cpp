@@ -1,4 +1,4 @@
-#include "platform/mission/flight_end.hpp"
+#include "platform/mission/logged_end.hpp"
 
 #include <fmt/format.h>
 
@@ -19,7 +19,7 @@ double number_or_unknown(const Json& json, const char* key) {
   return at != json.end() && at->is_number() ? at->get<double>() : kUnknown;
 }
 
-void take_result(const Json& json, FlightEnd& end) {
+void take_result(const Json& json, LoggedEnd& end) {
   end.has_result = true;
   end.reached = json.at("reached_goal").get<bool>();
   end.collided = json.at("collided").get<bool>();
@@ -32,8 +32,8 @@ void take_result(const Json& json, FlightEnd& end) {
 
 }  // namespace
 
-FlightEnd end_of(const std::string& path) {
-  FlightEnd end;
+LoggedEnd end_of(const std::string& path) {
+  LoggedEnd end;
   log::McapReader reader(path);
   bool is_flight = false;
   try {
@@ -62,7 +62,7 @@ FlightEnd end_of(const std::string& path) {
   return end;
 }
 
-std::string beyond(const FlightEnd& end, const char* option, double at_s) {
+std::string beyond(const LoggedEnd& end, const char* option, double at_s) {
   if (at_s <= end.recorded_s) return {};
   return fmt::format("{}: {:g} s: must be within the log, which ends at {:.2f} s{}", option, at_s,
                      end.recorded_s, end.damage.empty() ? "" : " where it is cut or damaged");

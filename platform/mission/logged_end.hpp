@@ -9,7 +9,7 @@ namespace roborun::mission {
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// NaN: the log does not say.
-struct FlightEnd {
+struct LoggedEnd {
   bool has_result{false};  ///< `/result` is there: a simulated flight that was logged to its end.
   bool reached{false}, collided{false};
   std::string reason;   ///< Why it ended; of a log without a result its last event.
@@ -22,9 +22,9 @@ struct FlightEnd {
 };
 
 /// Throws InputError for what cannot be read, for what is no flight log, and for a result that is none.
-[[nodiscard]] FlightEnd end_of(const std::string& path);
+[[nodiscard]] LoggedEnd end_of(const std::string& path);
 
 /// Empty, or the one line that refuses a moment behind the end of the log (`option`: who asks).
-[[nodiscard]] std::string beyond(const FlightEnd& end, const char* option, double at_s);
+[[nodiscard]] std::string beyond(const LoggedEnd& end, const char* option, double at_s);
 
 }  // namespace roborun::mission
