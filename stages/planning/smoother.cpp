@@ -198,6 +198,44 @@ Status Smoother::smooth(const SmoothRequest& request, const MapView& map, core::
   return Status::kNoPath;
 }
 
+namespace {
+
+/// Acceleration goes straight to a_W, stays there, and goes straight to zero.
+struct StopProfile {
+  Vector3 a_W = Vector3::Zero();
+  double ramp_in_s{}, hold_s{}, ramp_out_s{};
+};
+
+/// After a first ramp of this time the velocity that is left is L long. With deceleration b, jerk j and the limit not reached,
+/// b (ramp_in + b/j) / 2 = L.
+StopProfile stop_after(double ramp_in_s, const TrajectoryPoint& start, const MotionLimits& limits) noexcept {
+  const double j = limits.jerk_mps3;
+  const Vector3 left_W = start.v_W + 0.5 * ramp_in_s * start.a_W;
+  const double left_mps = left_W.norm();
+  if (!(left_mps > 0.0)) return {.ramp_in_s = ramp_in_s};
+  const double b_mps2 =
+      std::min(4.0 * left_mps / (ramp_in_s + std::sqrt(ramp_in_s * ramp_in_s + 8.0 * left_mps / j)),
+               limits.acceleration_mps2);
+  return {-b_mps2 / left_mps * left_W, ramp_in_s,
+          std::max(left_mps / b_mps2 - 0.5 * (ramp_in_s + b_mps2 / j), 0.0), b_mps2 / j};
+}
+
+/// The shortest first ramp that is within the limit of jerk. One that reaches the limit of acceleration from any direction always is,
+/// but where the speed is too low for it, it takes many times as long as the stop needs, and who stops anew with each
+/// decision never stands.
+StopProfile find_stop(const TrajectoryPoint& start, const MotionLimits& limits) noexcept {
+  constexpr int kHalvings = 32;
+  double within_s = (start.a_W.norm() + limits.acceleration_mps2) / limits.jerk_mps3, beyond_s = 0.0;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle_s = 0.5 * (within_s + beyond_s);
+    const double change_mps2 = (stop_after(middle_s, start, limits).a_W - start.a_W).norm();
+    (change_mps2 <= limits.jerk_mps3 * middle_s ? within_s : beyond_s) = middle_s;
+  }
+  return stop_after(within_s, start, limits);
+}
+
+}  // namespace
+
 Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, const MotionLimits& limits,
                        Trajectory& out) const noexcept {
   const double speed_mps = start.v_W.norm();
@@ -207,20 +245,14 @@ Status Smoother::brake(const TrajectoryPoint& start, MonotonicTime start_time, c
     out = Trajectory::hold(start.p_W, start_time);
     return Status::kOk;
   }
-  // Acceleration goes straight to its limit against the motion, stays there, and goes straight to zero.
-  const double ramp_in_s = (start.a_W.norm() + limits.acceleration_mps2) / limits.jerk_mps3;
-  const double ramp_out_s = limits.acceleration_mps2 / limits.jerk_mps3;
-  const Vector3 to_lose = start.v_W + 0.5 * ramp_in_s * start.a_W;
-  const double ramps_s = 0.5 * (ramp_in_s + ramp_out_s);
-  const double braking_mps2 = std::min(limits.acceleration_mps2, to_lose.norm() / ramps_s);
-  const double hold_s = std::max(to_lose.norm() / limits.acceleration_mps2 - ramps_s, 0.0);
-  const Vector3 a_W = braking_mps2 > 0.0 ? Vector3(-braking_mps2 * to_lose.normalized()) : Vector3::Zero();
+  const StopProfile profile = find_stop(start, limits);
   const Vector3 none = Vector3::Zero();
   Trajectory stop;
   stop.start_time = start_time;
   TrajectoryPoint at = start;
   for (const auto& [time_s, end_a_W] :
-       {std::pair{ramp_in_s, a_W}, std::pair{hold_s, a_W}, std::pair{ramp_out_s, none}}) {
+       {std::pair{profile.ramp_in_s, profile.a_W}, std::pair{profile.hold_s, profile.a_W},
+        std::pair{profile.ramp_out_s, none}}) {
     PolynomialSegment& segment = stop.segment[stop.segment_count++];
     const Vector3 jerk = time_s > 0.0 ? Vector3((end_a_W - at.a_W) / time_s) : none;
     segment.duration_s = time_s;

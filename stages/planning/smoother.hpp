@@ -64,8 +64,9 @@ class Smoother {
                               SmoothResult& result) noexcept;
 
   /// The shortest stop along the present velocity within the limits of acceleration and jerk, or a
-  /// hold at rest. Three segments, continuous up to acceleration: to the limit, at the limit, to zero.
-  /// kInvalidArgument: not finite or speed above 50 m/s; `out` untouched. RT-safe: O(1).
+  /// hold at rest. Three segments, continuous up to acceleration: to the deceleration that is reached, which is below
+  /// the limit where the speed is low, at it, to zero. A stop from the middle of a stop ends no later than that one (along a line; across,
+  /// about then). kInvalidArgument: not finite or speed above 50 m/s; `out` untouched. RT-safe: O(1).
   [[nodiscard]] Status brake(const TrajectoryPoint& start, MonotonicTime start_time,
                              const MotionLimits& limits, Trajectory& out) const noexcept;
 

@@ -352,6 +352,40 @@ TEST(Smoother, BrakesWithinTheLimit) {
   EXPECT_EQ(sut.brake(bad, {}, {6.0, 4.0}, t), Status::kInvalidArgument);
 }
 
+TEST(Smoother, StopsSlowMotionAsSoonAsTheJerkAllows) {
+  Smoother sut;
+  const MotionLimits limits{.speed_mps = 4.0, .acceleration_mps2 = 10.0, .jerk_mps3 = 8.0};
+  TrajectoryPoint start;
+  start.v_W.x() = 0.6;
+  start.a_W.x() = 1.0;
+  Trajectory t;
+  ASSERT_EQ(sut.brake(start, {}, limits, t), Status::kOk);
+  // Until nothing speeds it up a/j = 0.125 s, then from v + a^2/2j = 0.6625 m/s to rest in 2 sqrt(0.6625 / 8) s.
+  EXPECT_NEAR(t.duration_s(), 0.125 + 0.5755, 1e-4);
+}
+
+// A stop of which nothing is known to be free is replaced by each decision.
+TEST(Smoother, StopsThoughEachDecisionStopsAnew) {
+  Smoother sut;
+  const MotionLimits limits{.speed_mps = 4.0, .acceleration_mps2 = 10.0, .jerk_mps3 = 8.0};
+  core::CounterRng rng(5);
+  for (int n = 0; n < 200; ++n) {
+    TrajectoryPoint at;
+    at.v_W = Vector3(rng.uniform(-2, 2), rng.uniform(-2, 2), rng.uniform(-1, 1));
+    at.a_W = Vector3(rng.uniform(-2, 2), rng.uniform(-2, 2), rng.uniform(-2, 2));
+    Trajectory t;
+    ASSERT_EQ(sut.brake(at, {}, limits, t), Status::kOk);
+    const double once_s = t.duration_s(), once_m = (t.end_W() - at.p_W).norm();
+    double anew_s = 0.0;
+    for (; at.v_W.norm() > 0.05 && anew_s < 10.0; anew_s += 0.2) {
+      at = t.at_s(0.2);
+      ASSERT_EQ(sut.brake(at, {}, limits, t), Status::kOk);
+    }
+    EXPECT_LT(anew_s, 1.1 * once_s + 0.2);
+    EXPECT_LT(at.p_W.norm(), 1.1 * once_m + 0.05);
+  }
+}
+
 TEST(Smoother, SmoothDoesNotAllocate) {
   Smoother sut;
   const test::BoxView view = open_view();
