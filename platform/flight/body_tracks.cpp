@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/geometry/math.hpp"
 #include "platform/flight/surface_middle.hpp"
@@ -18,9 +19,10 @@ constexpr double kGate_m = 1.2;
 constexpr double kGateGrows_mps = 1.5;
 constexpr double kPositionGain = 0.6;
 constexpr double kVelocityGain = 0.35;
-constexpr int kProbation = 8;     // sightings in which what appeared is followed though it has not moved
-constexpr double kBody_m = 0.9;   // around the place that was seen
-constexpr double kTouch_m = 0.6;  // the same without a reserve
+constexpr int kProbation = 8;      // sightings in which what appeared is followed though it has not moved
+constexpr double kBody_m = 0.9;    // around the place that was seen
+constexpr double kTouch_m = 0.6;   // the same without a reserve
+constexpr double kBehind_m = 0.4;  // what is seen of a body is its near side: its middle is farther away
 // What constant velocity is wrong by: more while it was estimated from few sightings.
 constexpr double kGrows_mps = 0.25;
 constexpr double kGrowsAtFirst_mps = 0.8;
@@ -41,6 +43,11 @@ bool BodyTracks::is_sure(const Track& track, MonotonicTime now) noexcept {
   return track.sightings >= kSure && now - track.seen <= kLasts && track.v_W.norm() > kMoves_mps;
 }
 
+bool BodyTracks::is_followed(const Track& track, MonotonicTime now) noexcept {
+  if (track.sightings == 0 || now - track.seen > kLasts) return false;
+  return track.sightings < kProbation || now - track.moved <= kLasts;
+}
+
 BodyTracks::Track* BodyTracks::continued_by(const Vector3& place_W, MonotonicTime now) noexcept {
   Track* nearest = nullptr;
   double nearest_m = 0.0;
@@ -57,11 +64,13 @@ BodyTracks::Track* BodyTracks::continued_by(const Vector3& place_W, MonotonicTim
 }
 
 void BodyTracks::begin(const Vector3& place_W, MonotonicTime now) noexcept {
-  Track& oldest = *std::min_element(track_.begin(), track_.end(), [](const Track& a, const Track& b) {
-    return (a.sightings > 0 ? 1 : 0) < (b.sightings > 0 ? 1 : 0) ||
-           ((a.sightings > 0) == (b.sightings > 0) && a.seen < b.seen);
-  });
-  oldest = {place_W, Vector3::Zero(), now, 1};
+  const auto worth = [now](const Track& track) {
+    const bool moves = track.sightings >= kSure && now - track.moved <= kLasts;
+    return std::pair((track.sightings > 0 ? 1 : 0) + (moves ? 1 : 0), track.seen);
+  };
+  Track& least = *std::min_element(track_.begin(), track_.end(),
+                                   [&](const Track& a, const Track& b) { return worth(a) < worth(b); });
+  least = {.p_W = place_W, .seen = now, .sightings = 1};
 }
 
 void BodyTracks::observe(MonotonicTime now, std::span<const Vector3> places_W) noexcept {
@@ -89,12 +98,12 @@ void BodyTracks::see(Track& track, const Vector3& place_W, MonotonicTime now) no
   track.p_W = expected_W + (track.sightings == 1 ? 1.0 : kPositionGain) * residual;
   track.seen = now;
   ++track.sightings;
+  if (is_sure(track, now)) track.moved = now;
 }
 
 void BodyTracks::follow(MonotonicTime now, std::span<const stages::CloudPoint> points) noexcept {
   for (Track& track : track_) {
-    const bool is_new = track.sightings > 0 && track.sightings < kProbation && now - track.seen <= kLasts;
-    if (track.seen >= now || !(is_new || is_sure(track, now))) continue;
+    if (track.seen >= now || !is_followed(track, now)) continue;
     const auto middle_W = surface_middle_W(at_W(track, now), points);
     if (middle_W) see(track, *middle_W, now);
   }
@@ -127,6 +136,14 @@ BodyTracks::Meeting BodyTracks::meets(const Trajectory& trajectory, MonotonicTim
   Meeting meeting;
   std::array<double, kMost> before_m{};
   before_m.fill(kNever);
+  std::array<Vector3, kMost> behind{};
+  const Vector3 eye_W = trajectory.at(from).p_W;
+  for (std::size_t k = 0; k < kMost; ++k) {
+    const Vector3 sight = at_W(track_[k], from) - eye_W;
+    const double sight_m = level_m(sight);
+    behind[k] =
+        sight_m > 0.0 ? Vector3(kBehind_m / sight_m * Vector3(sight.x(), sight.y(), 0.0)) : Vector3::Zero();
+  }
   for (int i = 0; static_cast<double>(i) * kStep_s <= kHorizon_s; ++i) {
     const double t_s = static_cast<double>(i) * kStep_s;
     const MonotonicTime time = from + from_seconds(t_s);
@@ -134,7 +151,7 @@ BodyTracks::Meeting BodyTracks::meets(const Trajectory& trajectory, MonotonicTim
     for (std::size_t k = 0; k < kMost; ++k) {
       const Track& track = track_[k];
       if (!is_sure(track, from)) continue;
-      const Vector3 way = at_W(track, time) - at.p_W;
+      const Vector3 way = at_W(track, time) + behind[k] - at.p_W;
       const double distance_m = level_m(way);
       const bool nearer = distance_m < before_m[k];
       before_m[k] = distance_m;

@@ -21,8 +21,8 @@ class BodyTracks {
   static constexpr double kHorizon_s = 4.0;  ///< Farther ahead a constant velocity says little.
   static constexpr double kNever = std::numeric_limits<double>::infinity();
 
-  /// Places of one decision where surfaces were seen in space known to be free, at this instant. Beyond `kMost` bodies the
-  /// one that was not seen for longest is forgotten.
+  /// Places of one decision where surfaces were seen in space known to be free, at this instant. Beyond `kMost` places the
+  /// one that was not seen for longest is forgotten, bodies that move last.
   void observe(MonotonicTime now, std::span<const Vector3> places_W) noexcept;
   /// After observe(), with all surfaces of this decision: what appeared not long ago, or is known to move, is looked for
   /// where it should be now. What is slow stays for long in cells that are not free, and appears once. O(tracks x points).
@@ -51,6 +51,7 @@ class BodyTracks {
     Vector3 p_W = Vector3::Zero();
     Vector3 v_W = Vector3::Zero();
     MonotonicTime seen{};
+    MonotonicTime moved{};  ///< When it was last seen to move.
     int sightings{0};
   };
   /// It was seen here now.
@@ -60,6 +61,8 @@ class BodyTracks {
     return track.p_W + seconds(time - track.seen) * track.v_W;
   }
   [[nodiscard]] static bool is_sure(const Track& track, MonotonicTime now) noexcept;
+  /// It is looked for on its surface: new, or sure not long ago, though one estimate may say that it stands.
+  [[nodiscard]] static bool is_followed(const Track& track, MonotonicTime now) noexcept;
   /// The track that this place continues, or null.
   [[nodiscard]] Track* continued_by(const Vector3& place_W, MonotonicTime now) noexcept;
   void begin(const Vector3& place_W, MonotonicTime now) noexcept;

@@ -26,6 +26,10 @@ constexpr double kBeside_rad = 0.07;
 constexpr double kBefore_m = 0.6;  // in front of a surface, beyond what it may be off by
 constexpr std::array<double, 2> kTurns_deg{8.0, 16.0};
 constexpr int kDirections = 12;
+constexpr double kBody_m =
+    2.0;  // across, seen from above: what contradicts within so little may be one body that moves
+
+constexpr double kFar_m = 1e9;
 
 struct Part {
   int surfaces{0}, contradictions{0};
@@ -42,6 +46,8 @@ using Surfaces = core::StaticVector<Surface, kSide * kSide>;
 struct Fit {
   int in_free{0};  ///< Within known free space.
   int at_end{0};   ///< Where it ends.
+  Vector3 lowest_W = Vector3::Constant(kFar_m),
+          highest_W = Vector3::Constant(-kFar_m);  ///< Of those in free space.
 };
 
 Fit fit_of(const Surfaces& surfaces, const Pose& X_WC, const stages::MapView& known) noexcept {
@@ -51,6 +57,8 @@ Fit fit_of(const Surfaces& surfaces, const Pose& X_WC, const stages::MapView& kn
     const Vector3 p_W = X_WC * surface.p_C;
     if (known.is_free_at_finest(Aabb::around(p_W, surface.half_m), lookups)) {
       ++fit.in_free;
+      fit.lowest_W = fit.lowest_W.cwiseMin(p_W);
+      fit.highest_W = fit.highest_W.cwiseMax(p_W);
       continue;
     }
     const double range_m = surface.p_C.norm();
@@ -76,6 +84,8 @@ bool is_turned(const Surfaces& surfaces, const Pose& X_WC, const stages::MapView
   if (all < kLeastOfAll) return false;
   const Fit as_is = fit_of(surfaces, X_WC, known);
   if (16 * as_is.in_free < all) return false;
+  const Vector3 spread = as_is.highest_W - as_is.lowest_W;
+  if (spread.x() < kBody_m && spread.y() < kBody_m) return false;
   for (const double angle_deg : kTurns_deg) {
     for (int i = 0; i < kDirections; ++i) {
       const Matrix3 R_CT = turn(angle_deg * core::kDegree, 2.0 * core::kPi * i / kDirections);

@@ -217,13 +217,9 @@ void DecisionPipeline::check_committed(const DecisionInput& in, DecisionOutput& 
   const double until_s = free_until_s(polled, *in.committed, from_s, config_.vehicle.radius_m, work.units);
   // Where something moves, what is fast now is not flown on until a slower plan is there.
   const bool too_fast = out.motion && in.v_WB.norm() > kTooFast * out.decision.point.speed_limit_mps;
-  if (std::isinf(until_s) && !too_fast) {
-    out.early_stop = stop_before_body(in, known.view(), work, out.latency);
-    return;
-  }
-  const MonotonicTime free_until =
-      std::isinf(until_s) ? MonotonicTime::max() : in.committed->start_time + from_seconds(until_s);
-  out.early_stop = stop_before(in, free_until, known.view(), work, out.latency);
+  out.early_stop = std::isinf(until_s) ? stop_before_body(in, too_fast, known.view(), work, out.latency)
+                                       : stop_before(in, in.committed->start_time + from_seconds(until_s),
+                                                     known.view(), work, out.latency);
 }
 
 std::optional<Trajectory> DecisionPipeline::stop_before(const DecisionInput& in, MonotonicTime free_until,
@@ -344,7 +340,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   draft_.start = in.committed->at(draft_.takes_over);
   draft_.planner_work = out.work[core::StageId::kPlanner];
   draft_.smoother_work = {};
-  draft_.leaves = draft_.is_narrow = draft_.replaces = draft_.keeps = false;
+  draft_.leaves = draft_.is_narrow = draft_.replaces = draft_.dodges = draft_.keeps = false;
   const Known known(*this, in);
   draft_.committed_until_s =
       free_until_s(known.view(), *in.committed, seconds(in.now - in.committed->start_time),
@@ -444,6 +440,7 @@ void DecisionPipeline::choose(const DecisionInput& in, DecisionOutput& out) noex
     has_planned_ = true;
     is_narrow_ = draft_.is_narrow;
     if (draft_.leaves) leaves_at_ = draft_.trajectory.start_time;
+    if (draft_.dodges) dodges_at_ = draft_.trajectory.start_time;
     out.kind = DecisionKind::kNew;
     out.trajectory = draft_.trajectory;
     return;

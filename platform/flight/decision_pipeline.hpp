@@ -132,6 +132,7 @@ class DecisionPipeline {
     bool is_narrow{};  ///< With the room of slow flight.
     bool leaves{};     ///< The trajectory leaves a place without room.
     bool replaces{};   ///< What is flown meets a body, the trajectory later or not at all.
+    bool dodges{};     ///< The trajectory goes aside, out of the way of a body.
     bool keeps{};      ///< Nothing is better than what is flown: it meets a body latest.
   };
 
@@ -186,8 +187,9 @@ class DecisionPipeline {
   /// Aside, a few metres in eight directions: the one that meets nothing and ends nearest to the goal. `best_s` is when what
   /// is best so far meets a body.
   void dodge(const DecisionInput& in, core::StageBudget& budget, double& best_s, Trajectory& best) noexcept;
-  /// A stop instead of what is flown, if that meets a body before it could stop and the stop meets one later.
-  [[nodiscard]] std::optional<Trajectory> stop_before_body(const DecisionInput& in,
+  /// A stop instead of what is flown, if that is too fast where something moves, or meets a body before it could stop, and
+  /// the stop meets one no sooner; later, if nothing but the body asks for it.
+  [[nodiscard]] std::optional<Trajectory> stop_before_body(const DecisionInput& in, bool too_fast,
                                                            const stages::MapView& known, core::Work& work,
                                                            Nanos latency) const noexcept;
   /// Between the new trajectory, what is flown, and a stop.
@@ -212,6 +214,7 @@ class DecisionPipeline {
   bool has_planned_{false};  ///< A plan was found since the take-off.
   MonotonicTime leaves_at_ =
       MonotonicTime::min();  ///< Start of the last trajectory that leaves a place without room.
+  MonotonicTime dodges_at_ = MonotonicTime::min();  ///< The same of the last one that goes aside.
   Draft draft_;
   std::optional<Vector3> look_W_{};  ///< What it looks at while it stands without a way, or steps back.
   MonotonicTime blocked_since_{};    ///< Standing without a way, and the looks so far led nowhere.

@@ -26,10 +26,10 @@ constexpr std::uint64_t kLooks = 40;  // of one prediction, counted as so many l
 
 }  // namespace
 
-std::optional<Trajectory> DecisionPipeline::stop_before_body(const DecisionInput& in,
+std::optional<Trajectory> DecisionPipeline::stop_before_body(const DecisionInput& in, bool too_fast,
                                                              const stages::MapView& known, core::Work& work,
                                                              Nanos latency) const noexcept {
-  if (bodies_.count(in.now) == 0) return std::nullopt;
+  if (bodies_.count(in.now) == 0 && !too_fast) return std::nullopt;
   const MonotonicTime soonest = in.now + latency + config_.minor_frame;
   const auto meets = [&](const Trajectory& trajectory) {
     work.units += kLooks;
@@ -37,9 +37,13 @@ std::optional<Trajectory> DecisionPipeline::stop_before_body(const DecisionInput
   };
   const BodyTracks::Meeting flown = meets(*in.committed);
   const double speed_mps = in.committed->at(soonest).v_W.norm();
-  if (!(flown.near_s < kReact_s + speed_mps / config_.vehicle.acceleration_mps2)) return std::nullopt;
+  const bool near = flown.near_s < kReact_s + speed_mps / config_.vehicle.acceleration_mps2;
+  if (!near && !too_fast) return std::nullopt;
   auto stop = stop_before(in, MonotonicTime::max(), known, work, latency);
-  if (!stop || !(meets(*stop).score() > flown.score())) return std::nullopt;
+  if (!stop) return std::nullopt;
+  // What goes aside already is not stopped in a body's way, though it is fast.
+  const double score = meets(*stop).score();
+  if (too_fast ? score < flown.score() : score <= flown.score()) return std::nullopt;
   return stop;
 }
 
@@ -47,10 +51,17 @@ void DecisionPipeline::dodge(const DecisionInput& in, core::StageBudget& budget,
                              Trajectory& best) noexcept {
   const stages::FencedView fenced(map_.view(), config_.fence);
   const stages::FinestView finest(fenced);
+  // What is too fast to go aside at once does so while it brakes.
+  Trajectory stop;
+  if (smoother_.brake(draft_.start, draft_.takes_over, limits(config_.vehicle.acceleration_mps2), stop) !=
+      Status::kOk)
+    return;
+  const double speed_mps =
+      std::fmin(std::fmax(kDodge_mps, draft_.start.v_W.norm()), config_.vehicle.speed_mps);
   double best_rest_m = BodyTracks::kNever;
   for (const double distance_m : kDodge_m) {
     for (const auto& way : kDodgeWay) {
-      const Vector3 end_W = draft_.start.p_W + distance_m * Vector3(way[0], way[1], 0.0);
+      const Vector3 end_W = stop.end_W() + distance_m * Vector3(way[0], way[1], 0.0);
       const double rest_m = (in.goal_W - end_W).norm();
       if (!config_.flight_bounds_W.contains(end_W)) continue;
       const std::array<Vector3, 2> path_W{draft_.start.p_W, end_W};
@@ -58,13 +69,15 @@ void DecisionPipeline::dodge(const DecisionInput& in, core::StageBudget& budget,
       request.path_W = path_W;
       request.start = draft_.start;
       request.start_time = draft_.takes_over;
-      request.limits = limits(std::fmin(kDodge_mps, config_.vehicle.speed_mps));
+      request.limits = limits(speed_mps);
       request.radius_m = radius_m();
       stages::SmoothResult smoothed;
       RestOfBudget rest(budget, draft_.smoother_work);
       const Status status = smoother_.smooth(request, finest, rest, smoothed);
       draft_.smoother_work.units += smoothed.work.units;
-      if (status == Status::kBudgetSpent) return;
+      if (status == Status::kBudgetSpent) {
+        return;
+      }
       if (status != Status::kOk) continue;
       draft_.smoother_work.units += kLooks;
       const double score =
@@ -126,8 +139,13 @@ void DecisionPipeline::give_way(const DecisionInput& in, core::StageBudget& budg
                                        draft_.smoother_work.units);
     if (std::isinf(free_s) || free_s >= flown.touch_s) done = consider(stop, free_s);
   }
-  if (!done) dodge(in, budget, best_score, best);
-  draft_.keeps = is_free && flown.score() >= best_score;
+  // To which side was decided: what touches nothing is not changed for what an estimate is wrong by.
+  const bool is_aside =
+      is_free && !done && in.committed->start_time == dodges_at_ && std::isinf(flown.touch_s);
+  const double other_score = best_score;
+  if (!done && !is_aside) dodge(in, budget, best_score, best);
+  draft_.dodges = best_score > other_score;
+  draft_.keeps = is_aside || (is_free && flown.score() >= best_score);
   if (best_score < 0.0) return;
   draft_.trajectory = best;
   draft_.leaves &= best_score == first_score;

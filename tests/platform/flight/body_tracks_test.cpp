@@ -127,6 +127,32 @@ TEST(BodyTracks, DoNotFollowWhatStands) {
   EXPECT_FALSE(sut.near(at_s(3.0), {5, 0, 3}, {1, 0, 0}, 15.0));
 }
 
+/// Along y, and back from 5 s on: in between it stands for an instant, in cells that are not free.
+Vector3 turning_W(double time_s) { return {10.0, time_s < 5.0 ? -5.0 + time_s : 5.0 - time_s, 3.0}; }
+
+TEST(BodyTracks, FollowWhatTurnsRound) {
+  BodyTracks sut;
+  double t = 0.0;
+  for (; t <= 1.0; t += 0.2) see(sut, t, turning_W(t));
+  bool stood = false;
+  for (; t <= 8.0; t += 0.2) {
+    sut.follow(at_s(t), surface(turning_W(t)));
+    stood = stood || sut.count(at_s(t)) == 0;
+  }
+  EXPECT_TRUE(stood) << "one estimate said that it stands";
+  EXPECT_EQ(sut.count(at_s(8.0)), 1U);
+}
+
+TEST(BodyTracks, PlacesThatStandPushOutNoBodyThatMoves) {
+  BodyTracks sut = crossing_until(2.0);
+  ASSERT_EQ(sut.count(at_s(2.0)), 1U);
+  std::array<Vector3, BodyTracks::kMost + 2> places_W;  // newer than it, far away
+  for (std::size_t i = 0; i < places_W.size(); ++i)
+    places_W[i] = Vector3(100.0 + 8.0 * static_cast<double>(i), 0.0, 3.0);
+  sut.observe(at_s(2.4), places_W);
+  EXPECT_EQ(sut.count(at_s(2.4)), 1U);
+}
+
 TEST(BodyTracks, FollowManyAtOnceAndForgetTheOldest) {
   BodyTracks sut;
   for (double t = 0.0; t < 1.01; t += 0.2) {
