@@ -76,7 +76,7 @@ Status Policy::validate() const noexcept {
   const bool precision_ok = core::within(failures_until_finer, 1, 100) &&
                             core::within(coarser_levels_per_decision, 1, kPrecisionLevels) &&
                             core::within(cells_to_obstacle, 1.0, 100.0);
-  const bool volume_ok = core::above(planner_share, 0.0, 1.0);
+  const bool volume_ok = core::above(planner_share, 0.0, 1.0) && core::above(fine_volume_m3, 0.0, 1e9);
   const bool speed_ok = core::within(near_goal_m, 0.0, 1000.0) &&
                         core::above(near_goal_speed_mps, 0.0, 30.0) &&
                         core::above(motion_speed_mps, 0.0, 30.0) && core::above(thin_speed_mps, 0.0, 30.0);
@@ -195,6 +195,12 @@ double Governor::needed_s(const Task& task, int level, double share) const noexc
          (1.0 + config_.policy.reserve_ratio);
 }
 
+/// All that is in view; of cells finer than the published ones, what is nearest.
+double Governor::least_s(const Task& task, int level) const noexcept {
+  const bool fine = level < published_level() && task.see_m3 > config_.policy.fine_volume_m3;
+  return needed_s(task, level, fine ? config_.policy.fine_volume_m3 / task.see_m3 : 1.0);
+}
+
 /// Step 1: how precisely must we look? An obstacle grows by up to a cell, and so does the vehicle's box, on
 /// either side of a gap: a gap of width g loses up to four cells, so it is passable for certain on cells of
 ///   (g - width) / 4
@@ -232,7 +238,7 @@ double Governor::deadline_s(const Task& task, int asked_level, Decision& d) cons
   if (task.situation.surveying) d.time_budget = policy.longest_budget;
   double deadline_s = seconds(d.time_budget) / policy.decisions_per_budget;
   const Nanos longest = task.situation.motion ? policy.shortest : policy.longest;
-  const double useful_s = std::max(seconds(longest), needed_s(task, asked_level, 1.0));
+  const double useful_s = std::max(seconds(longest), least_s(task, asked_level));
   if (deadline_s >= useful_s) {
     deadline_s = useful_s;
     d.source = finer_levels(task.situation) > 0 ? BudgetSource::kFailures : BudgetSource::kLongest;
@@ -252,7 +258,7 @@ double Governor::deadline_s(const Task& task, int asked_level, Decision& d) cons
 Governor::Precision Governor::in_time(const Task& task, int asked_level, double deadline_s) const noexcept {
   // Time alone is no reason for cells finer than the published ones.
   Precision result{0, asked_level, 1.0};
-  while (result.coarsest < config_.coarsest_level && needed_s(task, result.coarsest, 1.0) > deadline_s)
+  while (result.coarsest < config_.coarsest_level && least_s(task, result.coarsest) > deadline_s)
     ++result.coarsest;
   result.finest = std::min(asked_level, published_level());
   while (result.finest < result.coarsest && needed_s(task, result.finest, 1.0) > deadline_s) ++result.finest;

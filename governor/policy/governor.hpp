@@ -41,7 +41,10 @@ struct Policy {
   /// At least so many cells between the vehicle and the nearest obstacle. [1, 100]
   double cells_to_obstacle{2.0};
   double planner_share{0.4};  ///< Of the perceived space, what a plan through it explores at most. (0, 1]
-  double near_goal_m{8.0};    ///< Nearer than this: at most 0.6 m cells [0, 1000] ...
+  /// With cells finer than the published ones a decision has to process this much, what is nearest (about 5 m around), and
+  /// more only where there is time: they are for the narrow place that it flies in. (0, 1e9]
+  double fine_volume_m3{500.0};
+  double near_goal_m{8.0};          ///< Nearer than this: at most 0.6 m cells [0, 1000] ...
   double near_goal_speed_mps{2.5};  ///< ... and this speed. (0, 30]
   /// While something moves nearby: no longer thinking than precision asks for, and this speed. At 2.5 m/s,
   /// and without stopping at once what is faster, 8 of 40 crossings ended in a collision. (0, 30]
@@ -115,6 +118,8 @@ class Governor final : public DecisionPolicy {
   [[nodiscard]] bool near_goal(const Situation& situation) const noexcept;
   /// Returns how long a decision takes that processes this share of all that is in view.
   [[nodiscard]] double needed_s(const Task& task, int level, double share) const noexcept;
+  /// Returns the same of as much as it must process at this level.
+  [[nodiscard]] double least_s(const Task& task, int level) const noexcept;
   [[nodiscard]] double predicted_s(Knob knob, int level, double volume_m3) const noexcept;
   /// Returns the time of the stages that no knob governs.
   [[nodiscard]] double overhead_s() const noexcept;

@@ -331,10 +331,12 @@ Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32
 
   // Better than standing still by at least one cell of the view.
   const double stay_m = promise_m(node(0), request) + detour_m(request, view, request.start_W, work.units);
-  if (request.ways != nullptr && follow_ways(s, map, std::fmin(best_m, stay_m) - view.cell_m(), result))
+  const bool is_better = best != 0 && best_m <= stay_m - view.cell_m();
+  // A known way is as long as its corners are apart, and may wind much more: where nothing else leads on it need not pay.
+  const double below_m = is_better ? best_m - view.cell_m() : std::numeric_limits<double>::infinity();
+  if (request.ways != nullptr && follow_ways(s, map, below_m, result))
     return goal_bad ? Status::kGoalBlocked : Status::kOk;
-  if (best == 0 || !(best_m <= stay_m - view.cell_m()))
-    return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
+  if (!is_better) return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
   Spare spare(work);
   extract(request, PolledView(map, spare, work), best, result);
   if (result.path_W.size() < 2) return Status::kNoPath;

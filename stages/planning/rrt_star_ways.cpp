@@ -24,7 +24,12 @@ bool RrtStar::follow_ways(Search& s, const MapView& map, double below_m, PlanRes
   const double reach_m = std::fmax(s.request.horizon_m, kKnownReach_m);
   const std::size_t count = s.request.ways->known_way(s.request.start_W, reach_m - 1.0, way_W);
   const auto rest_m = [&s](const Vector3& p_W) { return kUnknownWeight * s.request.ways->to_goal_m(p_W); };
-  const auto pays = [&](const Vector3& p_W, double length_m) { return length_m + rest_m(p_W) < below_m; };
+  // Nearer to the goal than the start in any case: who goes there does not come back.
+  const double nearer_m = rest_m(s.request.start_W) - map.cell_m();
+  const auto pays = [&](const Vector3& p_W, double length_m) {
+    const double to_goal_m = rest_m(p_W);
+    return to_goal_m < nearer_m && length_m + to_goal_m < below_m;
+  };
   int rounds = 0;
   for (std::size_t i = count; i-- > 0 && rounds < kSampled;) {
     const double straight_m = (way_W[i] - s.request.start_W).norm();

@@ -110,6 +110,7 @@ void WayMemory::forget() noexcept {
   seen_count_ = 0;
   ++search_;  // what was found by the last one is not there any more
   doubts_ = false;
+  turn_ = 0;
   looked_from_W_ = Vector3::Constant(1e9);
   seen_low_ = {0, 0, 0};
   seen_high_ = {-1, -1, -1};
@@ -248,29 +249,39 @@ Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, c
   seen_high_ = {std::max(seen_high_.x, high.x), std::max(seen_high_.y, high.y),
                 std::max(seen_high_.z, high.z)};
   wait_at(p_W);
+  const bool is_whole = renew_changed(low, high, budget, work);
+  return is_whole ? Status::kOk : Status::kBudgetSpent;
+}
+
+bool WayMemory::renew_changed(const Cell& low, const Cell& high, core::StageBudget& budget,
+                              core::Work& work) noexcept {
+  const Cell size{high.x - low.x + 1, high.y - low.y + 1, high.z - low.z + 1};
+  const auto count =
+      static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
   std::size_t changed = 0;
-  bool spent = false;
-  for (std::int32_t z = low.z; z <= high.z; ++z) {
-    for (std::int32_t y = low.y; y <= high.y; ++y) {
-      for (std::int32_t x = low.x; x <= high.x; ++x) {
-        WayCells cells;
-        const std::uint64_t digest = cells_at({x, y, z}, cells);
-        std::uint64_t& before = position_[position_of({x, y, z})].digest;
-        if (before == digest) continue;
-        work.units += kWorkOfABlock;
-        spent = spent || changed == changed_.size() || budget.spent(work);
-        if (spent) continue;
-        if (before == 0) position_pool_.use(++seen_count_);
-        before = digest;
-        renew({x, y, z}, cells);
-        position_[position_of({x, y, z})].is_new = true;
-        changed_[changed++] = {x, y, z};
-      }
-    }
+  bool is_whole = true;
+  // In turns: where noise changes more blocks than fit in a look, all of them get into one.
+  std::size_t done = 0;
+  for (; done < count && changed < changed_.size() && is_whole; ++done) {
+    const auto at = static_cast<std::int32_t>((turn_ + done) % count);
+    const Cell block{low.x + at % size.x, low.y + at / size.x % size.y, low.z + at / (size.x * size.y)};
+    WayCells cells;
+    const std::uint64_t digest = cells_at(block, cells);
+    Position& position = position_[position_of(block)];
+    if (position.digest == digest) continue;
+    work.units += kWorkOfABlock;
+    is_whole = !budget.spent(work);
+    if (!is_whole) break;
+    if (position.digest == 0) position_pool_.use(++seen_count_);
+    position.digest = digest;
+    renew(block, cells);
+    position.is_new = true;
+    changed_[changed++] = block;
   }
+  turn_ = (turn_ + done) % count;
   for (std::size_t i = 0; i < changed; ++i) find_doors(changed_[i]);
   for (std::size_t i = 0; i < changed; ++i) position_[position_of(changed_[i])].is_new = false;
-  return spent ? Status::kBudgetSpent : Status::kOk;
+  return is_whole;
 }
 
 void WayMemory::wait_at(const Vector3& p_W) noexcept {

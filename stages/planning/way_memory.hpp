@@ -126,6 +126,9 @@ class WayMemory final : public Ways {
   /// again. False: budget spent.
   [[nodiscard]] bool read_window(const MapView& map, const Cell& low, const Cell& high,
                                  core::StageBudget& budget, core::Work& work) noexcept;
+  /// What changed of the blocks low .. high, and their doors, as much as fits in one look. False: budget spent.
+  [[nodiscard]] bool renew_changed(const Cell& low, const Cell& high, core::StageBudget& budget,
+                                   core::Work& work) noexcept;
   /// Blocks of one look have places of their own, and keep them from look to look.
   [[nodiscard]] static std::size_t place_in_window(const Cell& block) noexcept;
   /// A block of the window and the seven that follow it; returns their digest.
@@ -206,7 +209,8 @@ class WayMemory final : public Ways {
   core::PoolRecord& block_pool_;
   std::uint32_t free_{};  ///< First of the blocks that are not in use.
   std::size_t block_count_{};
-  std::array<Cell, 512> changed_{};  ///< In this look.
+  std::array<Cell, 512> changed_{};  ///< In this look: no more blocks than that are read anew in one.
+  std::size_t turn_{0};              ///< Of the blocks of a look, the one that the next one begins with.
   std::span<Seen> window_;
   core::PoolRecord& window_pool_;
   std::span<Node> node_;  ///< Those of positions, then kRooms of each block.

@@ -22,6 +22,7 @@ TEST(GovernorConfigDeathTest, OnlyValidOnesAreMade) {
        {"coarser levels", [](Config& c) { c.policy.coarser_levels_per_decision = 0; }},
        {"cells", [](Config& c) { c.policy.cells_to_obstacle = 0.0; }},
        {"share", [](Config& c) { c.policy.planner_share = 1.1; }},
+       {"fine volume", [](Config& c) { c.policy.fine_volume_m3 = 0.0; }},
        {"near goal", [](Config& c) { c.policy.near_goal_m = kNan; }},
        {"near goal speed", [](Config& c) { c.policy.near_goal_speed_mps = 0.0; }},
        {"motion speed", [](Config& c) { c.policy.motion_speed_mps = -1.0; }},

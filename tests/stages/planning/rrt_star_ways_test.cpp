@@ -20,6 +20,31 @@ class Lookups final : public core::StageBudget {
   std::uint64_t most_;
 };
 
+/// A memory that tells a fifth of each length, as that of a room which winds.
+class ToldShort final : public Ways {
+ public:
+  explicit ToldShort(Ways& ways) : ways_(ways) {}
+  [[nodiscard]] Status look(const MapView& map, const Vector3& p_W, double reach_m, core::StageBudget& budget,
+                            core::Work& work) noexcept override {
+    return ways_.look(map, p_W, reach_m, budget, work);
+  }
+  [[nodiscard]] Status solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
+                             core::Work& work) noexcept override {
+    return ways_.solve(from_W, goal_W, budget, work);
+  }
+  void forget() noexcept override { ways_.forget(); }
+  [[nodiscard]] double to_goal_m(const Vector3& p_W) const noexcept override {
+    return 0.2 * ways_.to_goal_m(p_W);
+  }
+  [[nodiscard]] std::size_t known_way(const Vector3& from_W, double within_m,
+                                      std::span<Vector3> way_W) const noexcept override {
+    return ways_.known_way(from_W, within_m, way_W);
+  }
+
+ private:
+  Ways& ways_;
+};
+
 /// Walls across the way, each with a slot of 2.1 m for a vehicle of 1.8, now left, now right.
 class KnownWays : public ::testing::Test {
  protected:
@@ -84,6 +109,16 @@ TEST_F(KnownWays, ThatEndAtASlotThatIsTooNarrowAreFollowedToIt) {
   const PlanResult result = plan(1, 1000000);
   for (const Vector3& p_W : result.path_W) EXPECT_LT(p_W.x(), 4.5) << "not through it";
   EXPECT_LT(result.work.units, 300000U) << "searches are bounded";
+}
+
+TEST_F(KnownWays, ThatWindMoreThanTheirLengthTellsAreFollowedWhereNothingElseLeadsOn) {
+  const auto told_short = std::make_unique<ToldShort>(*ways_);
+  request_.ways = told_short.get();
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const PlanResult result = plan(seed, 400000);
+    ASSERT_GE(result.path_W.size(), 2U) << "seed " << seed;
+    EXPECT_LT(told_short->to_goal_m(result.path_W.back()), told_short->to_goal_m(request_.start_W));
+  }
 }
 
 TEST_F(KnownWays, SameRequestSamePath) {
