@@ -19,6 +19,17 @@ using mav::AutopilotKind;
 using mav::Companion;
 using Mode = sitl::FakeAutopilot::Mode;
 
+struct SetupSigning {
+  static constexpr mav::MessageType kType = mav::kSetupSigning;
+  std::uint8_t target_system{}, target_component{};
+  std::array<std::uint8_t, 32> secret_key{};
+  std::uint64_t initial_timestamp{};
+  static constexpr std::tuple kMembers{mav::Member<&SetupSigning::target_system>{"target_system"},
+                                       mav::Member<&SetupSigning::target_component>{"target_component"},
+                                       mav::Member<&SetupSigning::secret_key>{"secret_key"},
+                                       mav::Member<&SetupSigning::initial_timestamp>{"initial_timestamp"}};
+};
+
 /// A lane that asks for the command and leads the vehicle along x.
 class Lane {
  public:
@@ -460,6 +471,29 @@ TEST_P(CompanionContract, StandsByItselfWhereTheStopSaysWhenTheCableIsPulled) {
   sut->run(3.0);
   // ArduCopter stays in its mode; PX4 has changed it by itself, which is not ours to undo.
   EXPECT_EQ(sut->stage(), is_px4() ? AutopilotStage::kPilots : AutopilotStage::kOurs);
+}
+
+/// A key along the line would be everybody's who hears it: keys come from files alone.
+TEST_P(CompanionContract, TakesNoKeyThatComesAlongTheLine) {
+  const auto sut = lane();
+  sut->run(25.0);
+  ASSERT_EQ(sut->stage(), AutopilotStage::kOurs);
+  for (const auto& [sysid, compid] : {std::pair{1, 1}, std::pair{255, 190}}) {
+    for (const int target : {191, 0}) {
+      SetupSigning setup;
+      setup.target_system = 1;
+      setup.target_component = static_cast<std::uint8_t>(target);
+      setup.secret_key.fill(7);
+      setup.initial_timestamp = 1;
+      sut->say(static_cast<std::uint8_t>(sysid), static_cast<std::uint8_t>(compid), setup);
+    }
+  }
+  const auto states = sut->companion().counters().states;
+  const auto set_points = sut->fake().counters().set_points;
+  sut->run(2.0);
+  EXPECT_GT(sut->companion().counters().states, states + 150) << "what is not signed is still heard";
+  EXPECT_GT(sut->fake().counters().set_points, set_points + 80) << "and nothing is signed";
+  EXPECT_EQ(sut->stage(), AutopilotStage::kOurs);
 }
 
 /// Frames of somebody else on the same line, and nonsense.
