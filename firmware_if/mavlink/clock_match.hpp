@@ -5,21 +5,25 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 
 #include "firmware_if/time.hpp"
 
 namespace roborun::firmware_if::mavlink {
 
-/// offset = answer's time - (question + now) / 2; of the newest kWindow good samples the one with the shortest round trip
-/// counts. RT-safe: O(kWindow), no allocation.
+/// offset = answer's time - (question + now) / 2, wrong by half of the round trip at most; of the newest kWindow good samples the one
+/// with the shortest round trip counts. A sample that cannot be true beside it proves that a clock stood still, ran at another speed or
+/// was set: what is older counts no more. RT-safe: O(kWindow), no allocation.
 class ClockMatch {
  public:
   static constexpr std::size_t kWindow = 16;
   static constexpr std::size_t kLeast = 5;  ///< Samples before it is believed.
   static constexpr std::int64_t kMostTrip_ns = 10'000'000;
   static constexpr std::int64_t kGoodTrip_ns = 1'000'000;  ///< Shorter ones are never refused.
+  static constexpr std::int64_t kDrift_ns =
+      2'000'000;  ///< Of two quartz clocks within the window (8 s), and more.
   struct Counters {
-    std::uint64_t good{}, foreign{}, slow{};  ///< Never decrease.
+    std::uint64_t good{}, foreign{}, slow{}, moved{};  ///< Never decrease.
   };
 
   /// When the next question is due.
@@ -46,11 +50,22 @@ class ClockMatch {
         count_ == 0 ? kMostTrip_ns : std::min(kMostTrip_ns, std::max(kGoodTrip_ns, 3 * best().trip_ns));
     // Nobody's clock is 250 years from ours: the sum below cannot overflow.
     constexpr std::int64_t kFar_ns = std::int64_t{1} << 61U;
-    if (trip_ns < 0 || trip_ns > limit_ns || theirs_ns <= 0 || theirs_ns > kFar_ns) {
+    if (trip_ns < 0 || trip_ns > kMostTrip_ns || theirs_ns <= 0 || theirs_ns > kFar_ns) {
       ++counters_.slow;
       return false;
     }
-    sample_[count_ % kWindow] = {theirs_ns - (asked_ns + trip_ns / 2), trip_ns};
+    const Sample sample{theirs_ns - (asked_ns + trip_ns / 2), trip_ns};
+    const bool moved = matched() && std::abs(sample.offset_ns - best().offset_ns) >
+                                        (trip_ns + best().trip_ns) / 2 + kDrift_ns;
+    if (!moved && trip_ns > limit_ns) {
+      ++counters_.slow;
+      return false;
+    }
+    if (moved) {
+      ++counters_.moved;
+      oldest_ = count_;
+    }
+    sample_[count_ % kWindow] = sample;
     ++count_;
     ++counters_.good;
     return true;
@@ -67,7 +82,7 @@ class ClockMatch {
   [[nodiscard]] Nanos uncertainty() const noexcept { return Nanos{best().trip_ns / 2}; }
   /// The autopilot restarted.
   void forget() noexcept {
-    count_ = 0;
+    count_ = oldest_ = 0;
     asked_ = {};
   }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
@@ -77,9 +92,13 @@ class ClockMatch {
     std::int64_t offset_ns{}, trip_ns{};
   };
   [[nodiscard]] const Sample& best() const noexcept {
-    const auto used = static_cast<std::ptrdiff_t>(std::min(count_, kWindow));
-    return *std::min_element(sample_.begin(), sample_.begin() + used,
-                             [](const Sample& a, const Sample& b) { return a.trip_ns < b.trip_ns; });
+    const std::size_t used = std::min(count_ - oldest_, kWindow);
+    std::size_t found = (count_ - 1) % kWindow;
+    for (std::size_t i = 1; i < used; ++i) {
+      const std::size_t at = (count_ - 1 - i) % kWindow;
+      if (sample_[at].trip_ns < sample_[found].trip_ns) found = at;
+    }
+    return sample_[found];
   }
 
   std::array<std::int64_t, 4> asked_{};
@@ -87,6 +106,7 @@ class ClockMatch {
   MonotonicTime asked_at_{Nanos{-1'000'000'000}};
   std::array<Sample, kWindow> sample_{};
   std::size_t count_{0};
+  std::size_t oldest_{0};  ///< Count of the first sample that may still be true.
   Counters counters_{};
 };
 

@@ -82,10 +82,13 @@ std::optional<PhysicsStep> ArduPilotPhysics::take(std::span<const std::uint8_t> 
     send();
     return std::nullopt;
   }
-  if (frame_ && packet->frame < *frame_)
+  if (frame_ && packet->frame < *frame_) {
     ++counters_.restarts;
-  else if (frame_)
+    time_ = Nanos{0};
+  } else if (frame_) {
     counters_.lost += packet->frame - *frame_ - 1;
+  }
+  time_ += packet->step.dt;
   frame_ = packet->frame;
   ++counters_.steps;
   return packet->step;
@@ -106,7 +109,7 @@ std::optional<PhysicsStep> ArduPilotPhysics::wait() {
 }
 
 void ArduPilotPhysics::answer(sitl::SimulatedPlant& plant) {
-  answer_ = state_line(seconds(plant.now().time_since_epoch()), plant.vehicle().state());
+  answer_ = state_line(seconds(time_), plant.vehicle().state());
   send();
 }
 

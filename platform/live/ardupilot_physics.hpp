@@ -30,7 +30,8 @@ struct ServoPacket {
 [[nodiscard]] std::string state_line(double time_s, const sitl::VehicleState& state);
 
 /// One answer for each packet. The same number again: its answer was lost, and it has the same one again. Missing numbers are
-/// counted, and are no steps: ArduPilot waited too. A lower number: it restarted.
+/// counted, and are no steps: ArduPilot waited too. A lower number: it restarted. Stamps begin at zero with each start of it:
+/// it takes the time from its zero to the first stamp, where that is less than 0.1 s, for the step, and asks for that rate from then on.
 class ArduPilotPhysics final : public PhysicsLink {
  public:
   explicit ArduPilotPhysics(int port);
@@ -47,6 +48,7 @@ class ArduPilotPhysics final : public PhysicsLink {
   mavlink::Link link_;
   std::array<std::uint8_t, 2048> bytes_{};
   std::optional<std::uint32_t> frame_;
+  Nanos time_{};  ///< Of its steps, since it started.
   std::string answer_;
 };
 

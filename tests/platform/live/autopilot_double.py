@@ -63,12 +63,12 @@ class ArduPilot:
             except ConnectionRefusedError:
                 time.sleep(0.1)
         self.link.settimeout(60)
-        self.frame, self.clock = 7, None
+        self.frame, self.clock, self.rate = 7, 0.0, self.RATE_HZ
 
-    def packet(self, motors, magic=18458, rate=RATE_HZ):
+    def packet(self, motors, magic=18458, rate=None):
         thrust = [max(0.0, min(1.0, m)) for m in motors]
         pwm = [round(1000 + 1000 * (math.sqrt(0.1225 + 2.6 * t) - 0.35) / 1.3) for t in thrust]
-        return struct.pack("<HHI16H", magic, rate, self.frame, *pwm, *[1500] * 12)
+        return struct.pack("<HHI16H", magic, self.rate if rate is None else rate, self.frame, *pwm, *[1500] * 12)
 
     def answer(self):
         return self.link.recv(4096).decode()
@@ -80,9 +80,12 @@ class ArduPilot:
         self.text = self.answer()
         check("compact, one line", self.text.count("\n") == 2 and " " not in self.text, self.text)
         s = json.loads(self.text)
-        passed = s["timestamp"] - (self.clock or s["timestamp"] - 1 / self.RATE_HZ)
-        check("one step of the clock", abs(passed - 1 / self.RATE_HZ) < 1e-6, passed)
+        passed = s["timestamp"] - self.clock
+        check("one step of the clock, from zero on", abs(passed - 1 / self.RATE_HZ) < 1e-6, passed)
         self.clock = s["timestamp"]
+        # As the real one does: the rate is what the stamps say, the first one counted from zero (32-bit float, then cut).
+        if 0 < passed < 0.1:
+            self.rate = int(struct.unpack("f", struct.pack("f", 1 / passed))[0])
         return s
 
     def boot(self):
@@ -95,7 +98,7 @@ class ArduPilot:
         return s
 
     def restart(self):
-        self.frame = 0
+        self.frame, self.clock = 0, 0.0
         self.link.settimeout(10)
 
     def misbehave(self, motors):

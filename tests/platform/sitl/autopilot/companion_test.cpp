@@ -19,6 +19,17 @@ using mav::AutopilotKind;
 using mav::Companion;
 using Mode = sitl::FakeAutopilot::Mode;
 
+struct SetupSigning {
+  static constexpr mav::MessageType kType = mav::kSetupSigning;
+  std::uint8_t target_system{}, target_component{};
+  std::array<std::uint8_t, 32> secret_key{};
+  std::uint64_t initial_timestamp{};
+  static constexpr std::tuple kMembers{mav::Member<&SetupSigning::target_system>{"target_system"},
+                                       mav::Member<&SetupSigning::target_component>{"target_component"},
+                                       mav::Member<&SetupSigning::secret_key>{"secret_key"},
+                                       mav::Member<&SetupSigning::initial_timestamp>{"initial_timestamp"}};
+};
+
 /// A lane that asks for the command and leads the vehicle along x.
 class Lane {
  public:
@@ -462,6 +473,29 @@ TEST_P(CompanionContract, StandsByItselfWhereTheStopSaysWhenTheCableIsPulled) {
   EXPECT_EQ(sut->stage(), is_px4() ? AutopilotStage::kPilots : AutopilotStage::kOurs);
 }
 
+/// A key along the line would be everybody's who hears it: keys come from files alone.
+TEST_P(CompanionContract, TakesNoKeyThatComesAlongTheLine) {
+  const auto sut = lane();
+  sut->run(25.0);
+  ASSERT_EQ(sut->stage(), AutopilotStage::kOurs);
+  for (const auto& [sysid, compid] : {std::pair{1, 1}, std::pair{255, 190}}) {
+    for (const int target : {191, 0}) {
+      SetupSigning setup;
+      setup.target_system = 1;
+      setup.target_component = static_cast<std::uint8_t>(target);
+      setup.secret_key.fill(7);
+      setup.initial_timestamp = 1;
+      sut->say(static_cast<std::uint8_t>(sysid), static_cast<std::uint8_t>(compid), setup);
+    }
+  }
+  const auto states = sut->companion().counters().states;
+  const auto set_points = sut->fake().counters().set_points;
+  sut->run(2.0);
+  EXPECT_GT(sut->companion().counters().states, states + 150) << "what is not signed is still heard";
+  EXPECT_GT(sut->fake().counters().set_points, set_points + 80) << "and nothing is signed";
+  EXPECT_EQ(sut->stage(), AutopilotStage::kOurs);
+}
+
 /// Frames of somebody else on the same line, and nonsense.
 TEST_P(CompanionContract, ObeysAndBelievesNobodyElse) {
   const auto sut = lane();
@@ -590,6 +624,38 @@ TEST(ClockMatch, RefusesSlowAndForeignAnswersAndKeepsTheShortest) {
   EXPECT_FALSE(sut.answer(MonotonicTime{Nanos{now_ns}}, now_ns + kOffset_ns, 42)) << "not our question";
   EXPECT_EQ(sut.counters().slow, 2U);
   EXPECT_EQ(sut.counters().foreign, 1U);
+  EXPECT_EQ(sut.counters().moved, 0U);
+}
+
+/// As under a loaded machine with ArduCopter in simulation: its clock stands still whenever its world does.
+TEST(ClockMatch, FollowsAClockThatStoodStillWithTheFirstAnswerThatProvesIt) {
+  mav::ClockMatch sut;
+  std::int64_t offset_ns = 123'456'789'000;
+  std::int64_t now_ns = 1'000'000'000;
+  const auto error_ns = [&] { return sut.ours(now_ns + offset_ns).time_since_epoch().count() - now_ns; };
+  const auto round_trip = [&](std::int64_t there_ns, std::int64_t back_ns) {
+    const std::int64_t asked = sut.question(MonotonicTime{Nanos{now_ns}});
+    const std::int64_t theirs = now_ns + there_ns + offset_ns;
+    now_ns += there_ns + back_ns;
+    const bool taken = sut.answer(MonotonicTime{Nanos{now_ns}}, theirs, asked);
+    now_ns += 500'000'000;
+    return taken;
+  };
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(round_trip(100'000, 100'000));
+  offset_ns -= 6'000'000;
+  EXPECT_FALSE(round_trip(4'000'000, 5'000'000)) << "too slow to prove anything";
+  EXPECT_EQ(error_ns(), -6'000'000);
+  EXPECT_TRUE(round_trip(1'000'000, 2'000'000)) << "too slow for a good one, and proof enough";
+  EXPECT_EQ(sut.counters().moved, 1U);
+  EXPECT_LE(std::abs(error_ns()), 1'500'000);
+  EXPECT_TRUE(round_trip(100'000, 100'000));
+  EXPECT_EQ(error_ns(), 0);
+  for (int i = 0; i < 40; ++i) {  // 2.3 % slow, as it was seen: 11.5 ms between two questions
+    offset_ns -= 11'500'000;
+    ASSERT_TRUE(round_trip(100'000, 100'000));
+    ASSERT_EQ(error_ns(), 0);
+  }
+  EXPECT_EQ(sut.counters().moved, 41U);
 }
 
 }  // namespace
