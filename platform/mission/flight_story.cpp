@@ -498,7 +498,7 @@ FlightStory story_of(const std::string& path, const WorldOf& world, bool live) {
   told.damage = reader.damage();
   const Json& build = object_in(teller.configuration(), "build");
   const std::filesystem::path file(path);
-  told.page.title = "Flight " + file.stem().string();
+  told.page.title = "Flight log " + file.filename().string();
   told.page.footer = fmt::format("From {}. Flown by roborun, commit {}, {}.", file.filename().string(),
                                  text_in(build, "commit"), text_in(build, "compiler"));
   Json story = teller.story();

@@ -25,7 +25,7 @@ json story_in(const std::string& path) { return json::parse(story_of(path).page.
 TEST(FlightStory, HoldsWhatTheLogHolds) {
   const FlightStory told = story_of(sample(20.0));
   EXPECT_TRUE(told.damage.empty()) << told.damage;
-  EXPECT_EQ(told.page.title, "Flight sample");
+  EXPECT_EQ(told.page.title, "Flight log sample.mcap");
   EXPECT_EQ(told.page.footer, "From sample.mcap. Flown by roborun, commit 0123abc, GNU.");
   const json s = json::parse(told.page.story);
   EXPECT_EQ(s["facts"][0], (json{"outcome", "landed"}));
