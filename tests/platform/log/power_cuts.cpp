@@ -124,9 +124,11 @@ int main(int argc, char** argv) {
   std::mt19937_64 random(std::stoull(argv[4]));
   const std::string scratch = std::string(argv[1]) + ".cut";
   const std::vector<Entry> whole = entries_of(scratch, log);
-  const auto synced = std::count_if(calls.begin(), calls.end(), [](const auto& c) { return c.what == What::kSynced; });
+  const auto synced =
+      std::count_if(calls.begin(), calls.end(), [](const auto& c) { return c.what == What::kSynced; });
   if (synced < 10 || whole.size() < 100 || calls.back().size_bytes != static_cast<std::int64_t>(log.size())) {
-    fmt::print("{} syncs of {} messages in {} bytes: no recording of this log\n", synced, whole.size(), log.size());
+    fmt::print("{} syncs of {} messages in {} bytes: no recording of this log\n", synced, whole.size(),
+               log.size());
     return 2;
   }
   std::int64_t longest_sync_ns = 0;
@@ -144,16 +146,19 @@ int main(int argc, char** argv) {
     const std::vector<Entry> entries = entries_of(scratch, left);
     const std::int64_t lost_ns = at_ns - last_ns(entries);
     most_lost_ns = std::max(most_lost_ns, lost_ns);
-    const bool prefix = entries.size() <= whole.size() && std::equal(entries.begin(), entries.end(), whole.begin());
+    const bool prefix =
+        entries.size() <= whole.size() && std::equal(entries.begin(), entries.end(), whole.begin());
     if (prefix && lost_ns <= kMostLost_ns) continue;
     ++bad;
     fmt::print("cut at {:.3f} s: {:.3f} s lost{}\n", 1e-9 * static_cast<double>(at_ns),
                1e-9 * static_cast<double>(lost_ns), prefix ? "" : ", and messages that nobody wrote");
   }
   std::filesystem::remove(scratch);
-  fmt::print("{} cuts in {:.1f} s of flight ({} with torn pages): at most {:.3f} s lost, longest sync {:.3f} s, {} bad\n", cuts,
-             1e-9 * static_cast<double>(flight_ns), torn, 1e-9 * static_cast<double>(most_lost_ns),
-             1e-9 * static_cast<double>(longest_sync_ns), bad);
+  fmt::print(
+      "{} cuts in {:.1f} s of flight ({} with torn pages): at most {:.3f} s lost, longest sync {:.3f} s, {} "
+      "bad\n",
+      cuts, 1e-9 * static_cast<double>(flight_ns), torn, 1e-9 * static_cast<double>(most_lost_ns),
+      1e-9 * static_cast<double>(longest_sync_ns), bad);
   if (torn == 0) fmt::print("no cut tore anything: nothing was tried\n");
   return bad == 0 && torn > 0 ? 0 : 1;
 }

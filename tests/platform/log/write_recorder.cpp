@@ -27,8 +27,8 @@ std::int64_t now_ns() {
 }
 
 void record(RecordedCall::What what, std::int64_t begin_ns) {
-  static const int to = static_cast<int>(
-      syscall(SYS_openat, AT_FDCWD, std::getenv("RECORD_TO"), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644));
+  static const int to = static_cast<int>(syscall(SYS_openat, AT_FDCWD, std::getenv("RECORD_TO"),
+                                                 O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644));
   const RecordedCall call{what, begin_ns, now_ns(), size_bytes};
   if (syscall(SYS_write, to, &call, sizeof call) != sizeof call) std::abort();
 }
