@@ -18,7 +18,6 @@
 #include "platform/input/stop_signal.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/mission/flight_story.hpp"
-#include "platform/mission/logged_end.hpp"
 #include "platform/mission/scene.hpp"
 #include "platform/report/folder_page.hpp"
 #include "platform/report/result_line.hpp"
@@ -154,8 +153,9 @@ int report_folder(const ReportOptions& options) {
     std::string html;
     report::FolderRow row;
     try {
-      row = row_of(log.stem().string(), mission::end_of(log.string()));
-      html = report::flight_page_html(mission::story_of(log.string()).page);
+      const mission::FlightStory story = mission::story_of(log.string());
+      row = row_of(log.stem().string(), story.end);
+      html = report::flight_page_html(story.page);
     } catch (const InputError& error) {
       skipped.emplace_back(error.what());
       continue;
@@ -186,7 +186,8 @@ int report(const ReportOptions& options) {
                               : options.out;
   input::check_outputs({{"-o", out}}, {options.log, options.world});
   const mission::FlightStory story = mission::story_of(options.log, world_of(options));
-  if (!story.damage.empty()) fmt::print(stderr, "roborun: {}; the page goes until there\n", story.damage);
+  if (!story.end.damage.empty())
+    fmt::print(stderr, "roborun: {}; the page goes until there\n", story.end.damage);
   print_page(out, report::flight_page_html(story.page));
   return kDone;
 }

@@ -16,8 +16,10 @@ namespace {
 
 constexpr const char* kWorldFrame = "world";
 constexpr const char* kBodyFrame = "body";
-/// With the tenth of a second that a message of inputs waits for, a cut loses less than a second.
+/// With the tenth of a second that a message of inputs waits for, a cut loses less than a second. On real time the log's thread and
+/// the disk need some of that second.
 constexpr std::uint64_t kChunk_ns = 800'000'000;
+constexpr std::uint64_t kSyncedChunk_ns = 500'000'000;
 constexpr std::uint64_t kStatesPerPose = 4;    // 40 Hz to 10 Hz
 constexpr std::uint64_t kStatesPerPoint = 20;  // two points a second ...
 constexpr std::uint64_t kStatesPerPath = 80;
@@ -129,7 +131,7 @@ std::string decision_json(const DecisionEntry& e) {
 }
 
 FlightLog::FlightLog(const std::string& path, bool synced)
-    : file_(path, synced), writer_(file_, "", "roborun", {.chunk_ns = kChunk_ns}) {
+    : file_(path, synced), writer_(file_, "", "roborun", {.chunk_ns = synced ? kSyncedChunk_ns : kChunk_ns}) {
   const auto channel = [this](const char* topic, const char* schema, const std::string& text) {
     return writer_.add_channel(writer_.add_schema(schema, "jsonschema", text), topic, "json");
   };

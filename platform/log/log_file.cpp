@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <csignal>
+#include <filesystem>
 #include <system_error>
 
 #include "platform/input/input_error.hpp"
@@ -18,6 +19,15 @@ std::string cannot_log(const std::string& path, int error) {
   return fmt::format("{}: cannot be written: {}", path, std::generic_category().message(error));
 }
 
+/// After a power loss the file has its name only if the folder was written, too.
+void sync_folder_of(const std::string& path) {
+  const std::string folder = std::filesystem::absolute(path).parent_path().string();
+  const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return;
+  (void)fsync(fd);
+  (void)close(fd);
+}
+
 }  // namespace
 
 LogFile::LogFile(const std::string& path, bool synced) : path_(path), synced_(synced) {
@@ -27,6 +37,7 @@ LogFile::LogFile(const std::string& path, bool synced) : path_(path), synced_(sy
   regular_ = fstat(fd_, &status) == 0 && S_ISREG(status.st_mode);
   // Who reads a FIFO and goes away ends the log and not the flight.
   if (!regular_) (void)std::signal(SIGPIPE, SIG_IGN);
+  if (synced_ && regular_) sync_folder_of(path);
 }
 
 LogFile::~LogFile() {

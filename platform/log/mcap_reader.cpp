@@ -111,6 +111,8 @@ void McapReader::read_record(Message& message) {
     case Op::kChannel:
       return take_channel(record_);
     case Op::kMessage:
+      // No writer does both, and nothing else tells it from an index whose opcode has changed.
+      if (chunks_ > 0) throw InputError("a message outside of the chunks");
       return take_message(record_, message);
     case Op::kChunk:
       return open_chunk();

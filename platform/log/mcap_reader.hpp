@@ -27,7 +27,7 @@ struct Message {
 };
 
 /// What ends the reading of a file that goes on, or should: a cut, a change, or what this reader does not know.
-///  - Chunks: without compression or with zstd, at most kMostChunk_bytes; messages outside of chunks are read, too.
+///  - Chunks: without compression or with zstd, at most kMostChunk_bytes; messages outside of chunks are read in files without chunks.
 ///  - A record of an opcode that the format does not know is left out, as its specification asks; what was hidden by it
 ///    shows in a jump of Message::sequence, and at the end in the statistics and the CRC of the whole.
 ///  - Attachments and indexes are left out. The summary is compared with what was read.

@@ -11,7 +11,11 @@ namespace {
 
 static_assert(log::kUnseenWeight == stages::kUnknownWeight);
 
-constexpr int kSliceBlocks = static_cast<int>(log::MapSlice::kMostCells) / stages::kBlockCells;
+constexpr int kMostCells = static_cast<int>(log::MapSlice::kMostCells);
+// Merged cells are free if all of them are, occupied if one is. A slice is as wide as that or as wide as kMostMerged allow: at 6 m/s
+// and one slice per second what lies ahead is in it.
+constexpr double kSliceSpan_m = 25.0;
+constexpr int kMostMerged = 4;
 
 std::int64_t since(MonotonicTime start, MonotonicTime now) noexcept { return (now - start).count(); }
 
@@ -147,38 +151,47 @@ log::FailsafeEntry failsafe_entry(const flight::FailsafeEvent& event, MonotonicT
 }
 
 void fill_slice(const stages::MapView& view, const Vector3& p_W, log::MapSlice& slice) noexcept {
-  const double cell_m = view.finest_m();
-  const double block_m = stages::block_m(cell_m);
+  const double finest_m = view.finest_m();
+  int merged = 1;
+  while (merged < kMostMerged && kMostCells * merged * finest_m < kSliceSpan_m) merged *= 2;
+  const double block_m = stages::block_m(finest_m);
+  const int blocks = merged * kMostCells / stages::kBlockCells;
+  const int cells_per_block = stages::kBlockCells / merged;
   const auto block = [block_m](double at_m) { return static_cast<int>(std::floor(at_m / block_m)); };
-  const int x0 = block(p_W.x()) - kSliceBlocks / 2;
-  const int y0 = block(p_W.y()) - kSliceBlocks / 2;
+  const int x0 = block(p_W.x()) - blocks / 2;
+  const int y0 = block(p_W.y()) - blocks / 2;
   const double bottom_m = block(p_W.z()) * block_m;
   const int z =
-      std::clamp(static_cast<int>(std::floor((p_W.z() - bottom_m) / cell_m)), 0, stages::kBlockCells - 1);
-  slice.cell_m = cell_m;
+      std::clamp(static_cast<int>(std::floor((p_W.z() - bottom_m) / finest_m)), 0, stages::kBlockCells - 1);
+  slice.cell_m = merged * finest_m;
   slice.x_m = x0 * block_m;
   slice.y_m = y0 * block_m;
   slice.z_m = p_W.z();
-  slice.columns = slice.rows = static_cast<std::uint16_t>(kSliceBlocks * stages::kBlockCells);
+  slice.columns = slice.rows = static_cast<std::uint16_t>(kMostCells);
   stages::CellBlock cells;
   std::uint64_t lookups = 0;
-  for (int i = 0; i < kSliceBlocks * kSliceBlocks; ++i) {
-    const int column = i % kSliceBlocks;
-    const int row = i / kSliceBlocks;
+  for (int i = 0; i < blocks * blocks; ++i) {
+    const int column = i % blocks;
+    const int row = i / blocks;
     const stages::BlockContent content =
-        view.read({(x0 + column) * block_m, (y0 + row) * block_m, bottom_m}, cell_m, cells, lookups);
+        view.read({(x0 + column) * block_m, (y0 + row) * block_m, bottom_m}, finest_m, cells, lookups);
+    const bool mixed = content == stages::BlockContent::kMixed;
     const std::uint8_t all =
         content == stages::BlockContent::kFree ? log::MapSlice::kFree : log::MapSlice::kUnknown;
-    for (int y = 0; y < stages::kBlockCells; ++y) {
-      const int layer_row = stages::kBlockCells * z + y;
-      const auto line = static_cast<std::size_t>(layer_row);
-      for (int x = 0; x < stages::kBlockCells; ++x) {
+    for (int y = 0; y < cells_per_block; ++y) {
+      std::uint32_t free = ~0U;
+      std::uint32_t occupied = 0;
+      for (int k = 0; mixed && k < merged; ++k) {
+        const auto line = static_cast<std::size_t>(stages::kBlockCells * z + y * merged + k);
+        free &= cells.free[line];
+        occupied |= cells.occupied[line];
+      }
+      for (int x = 0; x < cells_per_block; ++x) {
+        const std::uint32_t bits = ((1U << merged) - 1U) << (x * merged);
         std::uint8_t cell = all;
-        if (content == stages::BlockContent::kMixed) {
-          if ((cells.free[line] >> x & 1) != 0) cell = log::MapSlice::kFree;
-          if ((cells.occupied[line] >> x & 1) != 0) cell = log::MapSlice::kOccupied;
-        }
-        const int at = (row * stages::kBlockCells + y) * slice.columns + column * stages::kBlockCells + x;
+        if (mixed && (free & bits) == bits) cell = log::MapSlice::kFree;
+        if (mixed && (occupied & bits) != 0) cell = log::MapSlice::kOccupied;
+        const int at = (row * cells_per_block + y) * slice.columns + column * cells_per_block + x;
         slice.cell[static_cast<std::size_t>(at)] = cell;
       }
     }

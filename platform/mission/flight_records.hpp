@@ -22,7 +22,8 @@ inline constexpr Nanos kSlicePeriod{1'000'000'000};
                                                 MonotonicTime now, MonotonicTime start) noexcept;
 [[nodiscard]] log::FailsafeEntry failsafe_entry(const flight::FailsafeEvent& event,
                                                 MonotonicTime start) noexcept;
-/// The finest cells around a place, at its height: at most 8 x 8 blocks. The thread of the decision lane, or lockstep.
+/// 128 x 128 cells around a place, at its height: the map's finest, or 2 x 2 or 4 x 4 of them as one, so that the slice is 25 m
+/// wide or more. O(1): at most 32 x 32 blocks are read. The thread of the decision lane, or lockstep.
 void fill_slice(const stages::MapView& view, const Vector3& p_W, log::MapSlice& slice) noexcept;
 
 }  // namespace roborun::mission

@@ -483,10 +483,14 @@ void check_world(const Json& story, const report::Scene& scene) {
 }  // namespace
 
 FlightStory story_of(const std::string& path, const WorldOf& world, bool live) {
+  FlightStory told;
   StoryTeller teller;
   log::McapReader reader(path);
   try {
-    for (log::Message message; reader.next(message);) teller.take(message);
+    for (log::Message message; reader.next(message);) {
+      teller.take(message);
+      take(message, told.end);
+    }
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: {}", path, error.what()));
   }
@@ -494,18 +498,18 @@ FlightStory story_of(const std::string& path, const WorldOf& world, bool live) {
     throw InputError(fmt::format("{}: no /state in it{}{}: must be a flight log of roborun (--log FILE.mcap)",
                                  path,
                                  reader.damage().empty() ? "" : ", and it is damaged: ", reader.damage()));
-  FlightStory told;
-  told.damage = reader.damage();
+  told.end.damage = reader.damage();
   const Json& build = object_in(teller.configuration(), "build");
   const std::filesystem::path file(path);
-  told.page.title = "Flight " + file.stem().string();
+  told.page.title = "Flight log " + file.filename().string();
   told.page.footer = fmt::format("From {}. Flown by roborun, commit {}, {}.", file.filename().string(),
                                  text_in(build, "commit"), text_in(build, "compiler"));
   Json story = teller.story();
   if (!teller.world().empty()) story["world"] = teller.world();
   told.page.live = live;
   if (live) story["live"] = true;
-  if (!told.damage.empty()) story["notes"].push_back("The log ends early: " + told.damage);
+  // The log of a flight that goes on has no end yet.
+  if (!told.end.damage.empty() && !live) story["notes"].push_back("The log ends early: " + told.end.damage);
   if (world) {
     const Json& flight = object_in(teller.configuration(), "flight");
     const auto seed = flight.find("seed");

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "platform/mission/logged_end.hpp"
 #include "platform/report/flight_page.hpp"
 #include "platform/report/svg_plot.hpp"
 
@@ -13,7 +14,7 @@ namespace roborun::mission {
 
 struct FlightStory {
   report::FlightPage page;
-  std::string damage;  ///< Empty, or one line: where the log ends early, and why. The story goes until there.
+  LoggedEnd end;  ///< The story goes until where the log is damaged.
 };
 
 /// The true world as it is at the height of its start, for a log that does not hold it. `seed`: of the flight, if the log says it.

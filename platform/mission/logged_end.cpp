@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "platform/input/input_error.hpp"
 #include "platform/input/json_reader.hpp"
-#include "platform/log/mcap_reader.hpp"
 
 namespace roborun::mission {
 namespace {
@@ -19,11 +19,21 @@ double number_or_unknown(const Json& json, const char* key) {
   return at != json.end() && at->is_number() ? at->get<double>() : kUnknown;
 }
 
+/// Of a result; throws InputError if it lacks it.
+template <typename Value>
+Value needed(const Json& json, const char* key) {
+  const auto at = json.find(key);
+  constexpr bool kText = std::is_same_v<Value, std::string>;
+  if (at == json.end() || !(kText ? at->is_string() : at->is_boolean()))
+    throw InputError(fmt::format("/result: {}: must be {}", key, kText ? "a text" : "true or false"));
+  return at->get<Value>();
+}
+
 void take_result(const Json& json, LoggedEnd& end) {
   end.has_result = true;
-  end.reached = json.at("reached_goal").get<bool>();
-  end.collided = json.at("collided").get<bool>();
-  end.reason = json.at("reason").get<std::string>();
+  end.reached = needed<bool>(json, "reached_goal");
+  end.collided = needed<bool>(json, "collided");
+  end.reason = needed<std::string>(json, "reason");
   end.time_s = number_or_unknown(json, "mission_time_s");
   end.mean_mps = number_or_unknown(json, "mean_velocity_mps");
   end.distance_m = number_or_unknown(json, "distance_m");
@@ -32,26 +42,32 @@ void take_result(const Json& json, LoggedEnd& end) {
 
 }  // namespace
 
+void take(const log::Message& message, LoggedEnd& end) {
+  const std::string& topic = message.channel->topic;
+  end.recorded_s = std::max(end.recorded_s, 1e-9 * static_cast<double>(message.log_ns));
+  if (topic == "/decision") {
+    ++end.decisions;
+    end.closest_m =
+        std::fmin(end.closest_m, number_or_unknown(input::parse_json(message.data), "closest_obstacle_m"));
+  } else if (topic == "/events" && !end.has_result) {
+    const Json event = input::parse_json(message.data);
+    const auto text = event.find("message");
+    end.reason = text != event.end() && text->is_string() ? text->get<std::string>() : std::string();
+  } else if (topic == "/result") {
+    take_result(input::parse_json(message.data), end);
+  }
+}
+
 LoggedEnd end_of(const std::string& path) {
   LoggedEnd end;
   log::McapReader reader(path);
   bool is_flight = false;
   try {
     for (log::Message m; reader.next(m);) {
-      const std::string& topic = m.channel->topic;
-      end.recorded_s = std::max(end.recorded_s, 1e-9 * static_cast<double>(m.log_ns));
-      is_flight = is_flight || topic == "/configuration";
-      if (topic == "/decision") {
-        ++end.decisions;
-        end.closest_m =
-            std::fmin(end.closest_m, number_or_unknown(input::parse_json(m.data), "closest_obstacle_m"));
-      } else if (topic == "/events" && !end.has_result) {
-        end.reason = input::parse_json(m.data).value("message", std::string());
-      } else if (topic == "/result") {
-        take_result(input::parse_json(m.data), end);
-      }
+      is_flight = is_flight || m.channel->topic == "/configuration";
+      take(m, end);
     }
-  } catch (const std::exception& error) {
+  } catch (const InputError& error) {
     throw InputError(fmt::format("{}: no log of a flight of this program: {}", path, error.what()));
   }
   end.damage = reader.damage();

@@ -4,6 +4,8 @@
 #include <limits>
 #include <string>
 
+#include "platform/log/mcap_reader.hpp"
+
 namespace roborun::mission {
 
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
@@ -20,6 +22,9 @@ struct LoggedEnd {
   std::string damage;  ///< Empty, or one line: where the log ends early, and why.
   [[nodiscard]] bool good() const noexcept { return has_result && reached && !collided; }
 };
+
+/// What one message tells; in the order of the log. Throws InputError for a result that is none.
+void take(const log::Message& message, LoggedEnd& end);
 
 /// Throws InputError for what cannot be read, for what is no flight log, and for a result that is none.
 [[nodiscard]] LoggedEnd end_of(const std::string& path);

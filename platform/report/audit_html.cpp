@@ -1,16 +1,18 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <string_view>
 
 #include "platform/report/audit_plot.hpp"
 #include "platform/report/audit_report.hpp"
+#include "platform/report/page_parts.hpp"
 #include "platform/report/svg.hpp"
 
 namespace roborun::report {
 namespace {
 
-std::string row(const std::vector<std::string>& cells, const char* tag = "td") {
-  std::string out = "<tr>";
+std::string row(const std::vector<std::string>& cells, const char* tag = "td", std::string_view style = {}) {
+  std::string out = style.empty() ? "<tr>" : fmt::format("<tr class=\"{}\">", style);
   for (const std::string& cell : cells) out += fmt::format("<{0}>{1}</{0}>", tag, xml_escape(cell));
   return out + "</tr>\n";
 }
@@ -18,22 +20,41 @@ std::string row(const std::vector<std::string>& cells, const char* tag = "td") {
 std::string one(double value) { return fmt::format("{:.1f}", value); }
 std::string count(std::uint64_t value) { return fmt::format("{}", value); }
 
-constexpr const char* kHead =
-    R"(<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>roborun timing audit</title><style>
-body{font:14px sans-serif;margin:24px;max-width:1300px;color:#222}
-table{border-collapse:collapse;margin:8px 0 24px}th,td{border:1px solid #ccc;padding:3px 8px;text-align:right}
-th:first-child,td:first-child{text-align:left}th{background:#f2f2f2}
-svg{margin:4px;border:1px solid #eee;font:10px sans-serif}circle{fill:#222}
-.t{font-weight:bold;font-size:12px}.g{stroke:#ddd}.b{stroke:#c33;stroke-dasharray:4 3}
-.p{fill:none;stroke:#26c;stroke-width:1.5}.r{fill:none;stroke:#333;stroke-width:1;stroke-dasharray:2 2}
-.m{stroke:#c33;stroke-width:3}.bad{color:#c33;font-weight:bold}.verdict{font-size:20px;font-weight:bold}
-</style></head><body><h1>roborun timing audit</h1>
+/// What this page has besides the style of all pages. Classes of one letter are those of audit_plot.
+constexpr const char* kStyle =
+    R"(table{display:block;max-width:100%;overflow-x:auto;margin:8px 0 24px}
+td,th{border-bottom:1px solid var(--line);padding:3px 14px 3px 0;text-align:right}
+th:first-child,td:first-child,.text td{text-align:left}h2{margin:28px 0 4px}
+svg{margin:6px 6px 6px 0;max-width:100%;height:auto;border:1px solid var(--line);border-radius:4px;font-size:11.5px;fill:var(--ink)}
+.t{font-weight:600;font-size:12.5px}.g{stroke:var(--line)}.b{stroke:var(--red);stroke-width:1.5;stroke-dasharray:6 3}
+.p{fill:none;stroke:var(--blue);stroke-width:1.5}.r{fill:none;stroke:var(--ink);stroke-dasharray:2 2}
+.m{stroke:var(--orange);stroke-width:3}.verdict{font-size:20px}
 )";
 
+std::string head() {
+  return fmt::format(
+      R"(<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'">
+<title>roborun timing audit</title>
+<style>
+{}{}</style></head><body>
+<h1>roborun timing audit</h1>
+)",
+      kPageStyle, kStyle);
+}
+
+/// Rows of a name and a text.
+std::string texts(const std::vector<std::pair<std::string, std::string>>& rows) {
+  std::string h = "<table class=\"text\">";
+  for (const auto& [name, text] : rows) h += row({name, text});
+  return h + "</table>\n";
+}
+
 std::string verdict(const AuditReport& r) {
-  std::string h = fmt::format("<p class=\"verdict\">Verdict: {}</p>\n<table>", passes(r) ? "PASS" : "FAIL");
-  for (const auto& [where, word] : verdict_by_lane(r)) h += row({where, word});
-  h += "</table>\n";
+  std::string h = fmt::format("<p class=\"verdict {}\">Verdict: {}</p>\n", passes(r) ? "good" : "bad",
+                              passes(r) ? "PASS" : "FAIL");
+  h += texts(verdict_by_lane(r));
   if (!r.missing.empty()) {
     h += "<p class=\"bad\">Not real time (best effort). Missing:</p><ul>\n";
     for (const std::string& why : r.missing) h += fmt::format("<li>{}</li>\n", xml_escape(why));
@@ -46,7 +67,8 @@ std::string verdict(const AuditReport& r) {
               q.value ? fmt::format("{:g}", *q.value) : "not shown: " + q.why_unknown,
               std::isinf(q.limit) ? "-"
               : q.pass()          ? "PASS"
-                                  : "FAIL"});
+                                  : "FAIL"},
+             "td", std::isinf(q.limit) || q.pass() ? "" : "bad");
   return h + "</table>\n";
 }
 
@@ -163,7 +185,7 @@ std::string memory(const AuditReport& r) {
 }  // namespace
 
 std::string audit_html(const AuditReport& r) {
-  std::string h = kHead + verdict(r);
+  std::string h = head() + verdict(r);
   h += fmt::format("<p>{:.0f} s at {:g} Hz{}, {} decisions ({} too late), {:.0f} m flown.</p>", r.seconds,
                    r.rate_Hz, r.load ? " under load" : "", r.decisions, r.decisions_too_late, r.flown_m);
   if (r.decision_stalls > 0)
@@ -172,9 +194,7 @@ std::string audit_html(const AuditReport& r) {
   if (!r.stopped_by.empty())
     h += fmt::format("<p class=\"bad\">Stopped by the overruns of {}</p>", xml_escape(r.stopped_by));
   if (r.interrupted) h += "<p class=\"bad\">Interrupted: all figures are of the time until then</p>";
-  h += "<h2>Identity</h2><table>";
-  for (const auto& [key, value] : r.identity) h += row({key, value});
-  h += "</table>\n";
+  h += "<h2>Identity</h2>" + texts(r.identity);
   return h + lanes(r) + slots(r) + how_often(r) + worst_case(r) + what_else(r) + memory(r) +
          "</body></html>\n";
 }

@@ -10,7 +10,7 @@
 namespace roborun::report {
 namespace {
 
-constexpr double kHeight = 220, kLeft = 58, kBottom = 30, kTop = 22, kRight = 10;
+constexpr double kHeight = 220, kLeft = 66, kBottom = 30, kTop = 22, kRight = 10;
 
 /// One plot with its scales: x and y are given as 0 .. 1 of the frame.
 class Plot {
@@ -26,8 +26,9 @@ class Plot {
   }
   void vertical(double share, const std::string& label, const char* style = "g") {
     svg_ += fmt::format(
-        R"(<line x1="{0:.1f}" x2="{0:.1f}" y1="{1}" y2="{2}" class="{3}"/><text x="{0:.1f}" y="{4}" text-anchor="middle">{5}</text>)",
-        x(share), kTop, kHeight - kBottom, style, kHeight - kBottom + 14, label);
+        R"(<line x1="{0:.1f}" x2="{0:.1f}" y1="{1}" y2="{2}" class="{3}"/><text x="{0:.1f}" y="{4}" text-anchor="{6}">{5}</text>)",
+        x(share), kTop, kHeight - kBottom, style, kHeight - kBottom + 16, label,
+        share > 0.99 ? "end" : "middle");
   }
   void horizontal(double share, const std::string& label, const char* style = "g") {
     svg_ += fmt::format(

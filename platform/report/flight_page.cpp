@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "platform/input/base64.hpp"
-#include "platform/report/flight_page_parts.hpp"
+#include "platform/report/page_parts.hpp"
 #include "platform/report/svg.hpp"
 
 namespace roborun::report {
@@ -30,7 +30,7 @@ std::string flight_page_html(const FlightPage& page) {
   const std::array<std::pair<std::string_view, std::string>, 6> parts{
       {{"@TITLE@", xml_escape(page.title)},
        {"@POLICY@", page.live ? "; connect-src 'self'" : ""},
-       {"@STYLE@", kFlightPageStyle},
+       {"@STYLE@", std::string(kPageStyle) + kFlightPageStyle},
        {"@FOOTER@", xml_escape(page.footer)},
        {"@STORY@", input::to_base64(deflated(page.story))},
        {"@SCRIPT@", kFlightPageScript}}};

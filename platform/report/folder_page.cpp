@@ -8,6 +8,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "platform/report/page_parts.hpp"
 #include "platform/report/svg.hpp"
 
 namespace roborun::report {
@@ -15,16 +16,11 @@ namespace {
 
 // Signs beside colours: a verdict is read without seeing colours.
 constexpr std::array<const char*, 3> kSign{"\u2717 failed", "? unknown", "\u2713 reached"};
-constexpr std::array<const char*, 3> kClass{"bad", "unknown", "good"};
+constexpr std::array<const char*, 3> kClass{"bad", "quiet", "good"};
 
 constexpr const char* kStyle =
-    R"(:root{color-scheme:light dark;--ink:#1c1e21;--back:#fff;--line:#d0d4d9;--bad:#b3261e;--good:#0b5cad;--dim:#5c636b}
-@media(prefers-color-scheme:dark){:root{--ink:#e6e8ea;--back:#15181b;--line:#3a4046;--bad:#ff9d94;--good:#8ec5ff;--dim:#a0a8b0}}
-body{font:15px/1.45 system-ui,sans-serif;margin:24px;color:var(--ink);background:var(--back)}
-table{border-collapse:collapse;font-variant-numeric:tabular-nums}
-th,td{padding:4px 12px 4px 0;text-align:right;border-bottom:1px solid var(--line);vertical-align:top}
-th:nth-child(-n+3),td:nth-child(-n+3){text-align:left}td small{display:block;color:var(--dim);max-width:60ch}
-a{color:inherit}.bad{color:var(--bad);font-weight:600}.good{color:var(--good)}.unknown,p.dim,ul{color:var(--dim)})";
+    R"(td,th{border-bottom:1px solid var(--line);padding:4px 14px 4px 0}
+td:nth-child(n+4),th:nth-child(n+4){text-align:right}td small{display:block;color:var(--quiet);max-width:60ch})";
 
 std::string number(double value) {
   return std::isfinite(value) ? fmt::format("{:.2f}", value) : std::string("\u2013");
@@ -68,17 +64,18 @@ std::string folder_page_html(const std::string& title, std::vector<FolderRow> ro
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src "
       "'unsafe-inline'\">"
-      "<meta name=\"viewport\" content=\"width=device-width\"><title>{0}</title>\n<style>{1}</style></head>"
-      "<body>\n<h1>{0}</h1>\n<p>{2} flights: {3} failed, {4} unknown, {5} reached the goal.</p>\n"
+      "<meta name=\"viewport\" "
+      "content=\"width=device-width\"><title>{0}</title>\n<style>\n{1}{2}</style></head>"
+      "<body>\n<h1>{0}</h1>\n<p>{3} flights: {4} failed, {5} unknown, {6} reached the goal.</p>\n"
       "<table><thead><tr><th scope=\"col\">flight</th><th scope=\"col\">verdict</th>"
       "<th scope=\"col\">why it ended</th><th scope=\"col\">time s</th><th scope=\"col\">mean m/s</th>"
       "<th scope=\"col\">nearest obstacle m</th></tr></thead><tbody>\n",
-      xml_escape(title), kStyle, rows.size(), count[0], count[1], count[2]);
+      xml_escape(title), kPageStyle, kStyle, rows.size(), count[0], count[1], count[2]);
   for (const FolderRow& row : rows) html += row_of(row);
   html +=
-      "</tbody></table>\n<p class=\"dim\">Nearest obstacle: the nearest that the vehicle has seen when it "
+      "</tbody></table>\n<p class=\"quiet\">Nearest obstacle: the nearest that the vehicle has seen when it "
       "decided.</p>\n";
-  if (!skipped.empty()) html += "<h2>Not flights</h2>\n<ul>\n";
+  if (!skipped.empty()) html += "<h2>Not flights</h2>\n<ul class=\"quiet\">\n";
   for (const std::string& line : skipped) html += fmt::format("<li>{}</li>\n", xml_escape(line));
   if (!skipped.empty()) html += "</ul>\n";
   return html + "</body></html>\n";

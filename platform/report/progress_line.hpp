@@ -4,6 +4,8 @@
 #include <chrono>
 #include <string>
 
+#include "platform/report/terminal_pace.hpp"
+
 namespace roborun::report {
 
 class ProgressLine {
@@ -14,7 +16,7 @@ class ProgressLine {
   ProgressLine& operator=(const ProgressLine&) = delete;
 
   /// True if a call of show() now would be seen, so that nobody formats for nothing.
-  [[nodiscard]] bool due() const;
+  [[nodiscard]] bool due() const { return pace_.due(); }
   /// Writes the line to standard error.
   void show(const std::string& text);
   /// Takes the line off the terminal before something else is printed there.
@@ -24,10 +26,9 @@ class ProgressLine {
 
  private:
   using Clock = std::chrono::steady_clock;
-  bool terminal_;
+  TerminalPace pace_;
   bool shown_{false};
-  Clock::time_point start_;
-  Clock::time_point last_;
+  Clock::time_point start_{Clock::now()};
 };
 
 }  // namespace roborun::report

@@ -23,27 +23,23 @@ bool is_screen(std::FILE* file) {
 
 }  // namespace
 
-StatusScreen::StatusScreen(std::FILE* to) : to_(to), terminal_(is_screen(to)), last_(Clock::now()) {}
+StatusScreen::StatusScreen(std::FILE* to) : to_(to), pace_(is_screen(to)) {}
 
 StatusScreen::~StatusScreen() {
   if (shown_ > 0) write(to_, fmt::format("\x1b[{}A\x1b[J", shown_));
 }
 
-bool StatusScreen::due() const {
-  return std::chrono::duration<double>(Clock::now() - last_).count() >= (terminal_ ? 0.2 : 10.0);
-}
-
 void StatusScreen::show(const std::vector<Row>& rows) {
   if (!due()) return;
-  last_ = Clock::now();
+  pace_.said();
   std::string text = shown_ > 0 ? fmt::format("\x1b[{}A", shown_) : "";
   for (const auto& [what, how] : rows) {
-    if (terminal_)
+    if (pace_.terminal())
       text += fmt::format("{:<10} {}\x1b[K\n", what, how);
     else
       text += fmt::format("{}{} {}", text.empty() ? "" : ", ", what, how);
   }
-  if (terminal_)
+  if (pace_.terminal())
     shown_ = rows.size();
   else
     text += "\n";

@@ -2,11 +2,12 @@
 /// seconds.
 #pragma once
 
-#include <chrono>
 #include <cstdio>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "platform/report/terminal_pace.hpp"
 
 namespace roborun::report {
 
@@ -22,16 +23,14 @@ class StatusScreen {
   StatusScreen& operator=(const StatusScreen&) = delete;
 
   /// True if a call of show() now would be seen.
-  [[nodiscard]] bool due() const;
+  [[nodiscard]] bool due() const { return pace_.due(); }
   /// In the place of the rows before. Nothing before it is due().
   void show(const std::vector<Row>& rows);
 
  private:
-  using Clock = std::chrono::steady_clock;
   std::FILE* to_;
-  bool terminal_;
+  TerminalPace pace_;
   std::size_t shown_{0};  ///< Lines on the terminal.
-  Clock::time_point last_;
 };
 
 }  // namespace roborun::report

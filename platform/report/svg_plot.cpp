@@ -11,6 +11,7 @@ namespace roborun::report {
 namespace {
 
 constexpr double kWidth = 1400.0;
+constexpr double kLeastWidth = 860.0;  // for the texts above the panels
 constexpr double kLeft = 70.0;
 constexpr double kRight = 40.0;
 constexpr double kChartHeight = 90.0;
@@ -70,12 +71,13 @@ std::string mission_svg(const Scene& scene, std::span<const MissionReport> missi
   const double scale = std::min((kWidth - kLeft - kRight) / size.x(), kMaxPanel / size.y());
   const double panel = size.y() * scale;
   const double right = kLeft + size.x() * scale;
+  const double width = std::max(kLeastWidth, right + kRight);
   double top_mps = 1.0;
   for (const MissionReport& m : missions) top_mps = std::max(top_mps, std::ceil(m.result.max_velocity_mps));
 
   svg.text(kLeft, 34, scene.title, "start", 18, kInk, "bold");
   const Quantity coloured = quantity(colour, missions);
-  draw_legend(svg, coloured, kWidth - kRight, 48);
+  draw_legend(svg, coloured, width - kRight, 48);
   double y = 96;
   for (std::size_t i = 0; i < missions.size(); ++i) {
     const MissionResult& r = missions[i].result;
@@ -111,7 +113,7 @@ std::string mission_svg(const Scene& scene, std::span<const MissionReport> missi
            "charts: over the way from start to goal, colours as the squares above; dark: "
            "obstacles; red: congestion",
            "start", 12, kSoft);
-  return svg.finish(kWidth, y + 4);
+  return svg.finish(width, y + 4);
 }
 
 std::string maps_svg(const Scene& scene, std::span<const MissionReport> missions) {

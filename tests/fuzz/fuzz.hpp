@@ -1,22 +1,19 @@
 /// What every fuzz target needs: choices out of bytes, what must hold, and a file for readers that take a path.
 #pragma once
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
 
 #include "platform/input/input_error.hpp"
+#include "tests/support/scratch.hpp"
 
 /// The target of a program: returns 0, or ends the process. libFuzzer calls it (toolchain/fuzz), or replay_main.cpp.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
@@ -70,29 +67,9 @@ class Choices {
   std::span<const std::uint8_t> rest_;
 };
 
-/// A folder of this process alone below $TMPDIR, gone when it ends.
-inline const std::filesystem::path& folder() {
-  static const struct Folder {
-    Folder() : path(std::filesystem::temp_directory_path() / ("roborun.fuzz." + std::to_string(getpid()))) {
-      std::filesystem::create_directories(path);
-    }
-    ~Folder() {
-      std::error_code ignored;
-      std::filesystem::remove_all(path, ignored);
-    }
-    Folder(const Folder&) = delete;
-    Folder& operator=(const Folder&) = delete;
-    std::filesystem::path path;
-  } here;
-  return here.path;
-}
-
-/// A file of it with these bytes.
+/// A scratch file with these bytes.
 inline std::string file(const std::string& name, std::span<const std::uint8_t> bytes) {
-  const std::string path = (folder() / name).string();
-  std::ofstream out(path, std::ios::binary);
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  return path;
+  return test::scratch_file(name, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace roborun::fuzz

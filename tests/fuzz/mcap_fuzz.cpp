@@ -28,8 +28,7 @@ std::string records_of(fuzz::Choices& choices) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   fuzz::Choices choices(data, size);
   const std::string bytes = choices.byte() % 2U == 1 ? records_of(choices) : choices.text();
-  const std::string path =
-      fuzz::file("f.mcap", {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+  const std::string path = test::scratch_file("f.mcap", bytes);
   fuzz::refuse_or([&] {
     log::McapReader reader(path);
     log::Message message;

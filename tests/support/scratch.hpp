@@ -1,6 +1,6 @@
+/// Files of a test or a fuzz target.
 #pragma once
 
-#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -12,7 +12,7 @@ namespace roborun::test {
 /// An empty folder of this process alone, gone when the process ends: tests run side by side.
 inline const std::filesystem::path& scratch_folder() {
   static const struct Folder {
-    Folder() : path(std::filesystem::path(testing::TempDir()) / ("roborun." + std::to_string(getpid()))) {
+    Folder() : path(std::filesystem::temp_directory_path() / ("roborun." + std::to_string(getpid()))) {
       std::filesystem::remove_all(path);
       std::filesystem::create_directories(path);
     }

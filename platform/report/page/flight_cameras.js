@@ -13,7 +13,7 @@ class Cameras {
       const figure = document.createElement('figure');
       camera.canvas = document.createElement('canvas');
       camera.canvas.setAttribute('role', 'img');
-      camera.canvas.setAttribute('aria-label', `What camera ${i + 1} saw`);
+      camera.canvas.setAttribute('aria-label', `What camera ${camera.name || i + 1} saw`);
       camera.caption = document.createElement('figcaption');
       figure.append(camera.canvas, camera.caption);
       $('cameras').append(figure);
@@ -22,7 +22,7 @@ class Cameras {
   draw(t, theme) {
     this.of.forEach((camera, i) => {
       const at = index_at(camera.times, t + 1e-6), image = camera.images[at];
-      camera.caption.textContent = `${i + 1}${camera.name ? `, ${camera.name}` : ''}: ${image ? `${(t - image.time_s).toFixed(1)} s before` : 'nothing yet'}`;
+      camera.caption.textContent = `${camera.name || i + 1}: ${image ? `${(t - image.time_s).toFixed(1)} s ago` : 'nothing yet'}`;
       if (image !== camera.shown || theme !== this.theme) this.paint(camera.canvas, image, theme);
       camera.shown = image;
     });
@@ -42,7 +42,7 @@ class Cameras {
     }
   }
   legend(theme) {
-    const range_m = this.of.find(Boolean).images[0].range_m, box = (colour, words) => `<i class="box" style="background:${colour}"></i>${words}`;
+    const range_m = this.of.find(Boolean).images[0].range_m, box = (colour, words) => `<span><i class="box" style="background:${colour}"></i>${words}</span>`;
     $('depths').innerHTML = [0, 0.5, 1].map(r => box(depth_colour(r * (kLevels - 1), theme),
       `${words_of_number(kNearest_m * Math.pow(range_m / kNearest_m, r))} m`)).join('') + box(theme.panel, 'nothing in range') + box(theme.pink, 'no value');
   }

@@ -88,7 +88,7 @@ class Chart extends Panel {
   }
   draw(t, theme) {
     const g = this.begin(theme);
-    const marks = this.logarithmic ? [0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.6, 1.2, 2.4, 4.8, 9.6, 20, 50, 100].filter(v => v >= this.low && v <= this.high)
+    const marks = this.logarithmic ? [0.01, 0.02, 0.05, 0.1, 0.15, 0.3, 0.6, 1.2, 2.4, 4.8, 9.6, 20, 50, 100].filter(v => v >= this.low && v <= this.high)
                                    : round_steps(this.low, this.high, 4);
     let below = Infinity;
     for (const v of marks) {
@@ -159,8 +159,8 @@ class Bands extends Panel {
       const x = this.axis.x(band.from, this.width), wide = this.axis.x(band.until, this.width) - x;
       g.fillStyle = theme[band.colour]; g.globalAlpha = 0.28; g.fillRect(x, kTop + 14, wide, high); g.globalAlpha = 1;
       g.fillRect(x, kTop + 14, 1.5, high);
-      g.save(); g.beginPath(); g.rect(x, 0, wide, this.height); g.clip();
-      g.fillStyle = theme.ink; g.fillText(band.name, x + 5, kTop + 14 + high / 2 + 4); g.restore();
+      g.fillStyle = theme.ink;
+      if (g.measureText(band.name).width + 8 < wide) g.fillText(band.name, x + 5, kTop + 14 + high / 2 + 4);
     }
     g.fillStyle = theme.ink;
     for (const time of this.marks) {

@@ -36,7 +36,7 @@ function charts_of(story, axis, choose) {
         of(d, name, d[key].map(v => v === null ? null : v / 1000), colour, dash, true)) }, choose),
     new Chart(parent, axis, { title: 'Battery', unit: '%', most: 100, series: [
       of(s, 'left', s.battery_ratio.map(v => v === null ? null : 100 * v), 'green')] }, choose),
-    new Bands(parent, axis, { title: 'Failsafe and events', marks: story.events.map(e => e.time_s), bands: bands_of(story, axis) }, choose)];
+    new Bands(parent, axis, { title: 'Phases and failsafe', marks: story.events.map(e => e.time_s), bands: bands_of(story, axis) }, choose)];
   return list.filter(chart => { if (chart.empty) chart.box.remove(); return !chart.empty; });
 }
 
@@ -89,7 +89,9 @@ class Page {
     this.rows = rows.map(([time, what, more]) => {
       const row = document.createElement('tr');
       for (const text of [`${time.toFixed(2)} s`, what, more]) row.append(Object.assign(document.createElement('td'), { textContent: text }));
+      row.tabIndex = 0;
       row.addEventListener('click', () => this.go(time));
+      row.addEventListener('keydown', e => { if (e.key === 'Enter') this.go(time); });
       $('events').append(row);
       return { time, row };
     });
@@ -116,6 +118,7 @@ class Page {
     else if (e.key === 'Home') this.go(this.axis.from);
     else if (e.key === 'End') this.go(this.axis.until);
     else if (e.key === ' ') this.play(!this.playing);
+    else if (e.key === '+' || e.key === '-') this.scene.zoom(e.key === '+' ? 1.25 : 0.8);
     else return;
     e.preventDefault();
   }
@@ -163,11 +166,20 @@ class Page {
   }
   repaint() { this.theme = read_theme(); this.legend(); this.draw(); }
   legend() {
-    const theme = this.theme, line = (colour, words) => `<i style="border-color:${colour}"></i>${words}`;
-    const box = (colour, words) => `<i class="box" style="background:${colour}"></i>${words}`;
+    const theme = this.theme, line = (colour, words) => `<span><i style="border-color:${colour}"></i>${words}</span>`;
+    const box = (colour, words) => `<span><i class="box" style="background:${colour}"></i>${words}</span>`;
     $('legend').innerHTML = line(speed_colour(0, theme), 'flown, slow') + line(speed_colour(1, theme), `flown, ${this.scene.top_speed.toFixed(1)} m/s`) +
       line(theme.red, 'planned') + (this.story.map.length ? box(theme.free, 'known to be free') + box(theme.known, 'known to be occupied, at its height then') : '') +
       (this.story.world ? line(theme.quiet, 'what truly stands there') : '');
+  }
+  explain(why) {
+    if (why === this.why) return;
+    this.why = why;
+    $('why').replaceChildren(...why.split('\n').map(line => {
+      const text = Object.assign(document.createElement('div'), { textContent: line + '\n' });
+      text.style.setProperty('--in', `${/^ *\S.*?  +|^ */.exec(line)[0].length}ch`);
+      return text;
+    }));
   }
   draw() {
     const d = this.story.decision, s = this.story.state, at = index_at(d.time_s, this.t + 1e-6), now = Math.max(0, index_at(s.time_s, this.t));
@@ -175,7 +187,7 @@ class Page {
     $('when').textContent = at < 0 ? 'Before the first decision' : `Decision ${at + 1} of ${d.time_s.length}, ${d.time_s[at].toFixed(2)} s`;
     $('doing').textContent = `at (${[s.x_m, s.y_m, s.z_m].map(v => v[now].toFixed(1)).join(', ')}) m, ${s.speed_mps[now].toFixed(1)} m/s` +
       (s.phase[now] ? `, ${s.phase[now]}` : '');
-    $('why').textContent = at < 0 ? 'Nothing was decided yet.' : d.why[at] || 'The log holds no reasons.';
+    this.explain(at < 0 ? 'Nothing was decided yet.' : d.why[at] || 'The log holds no reasons.');
     this.cameras.draw(this.t, this.theme);
     this.scene.draw(this.t, this.theme, $('follow').checked);
     for (const chart of this.charts) chart.draw(this.t, this.theme);

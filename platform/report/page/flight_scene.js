@@ -143,9 +143,12 @@ class Scene {
     this.canvas.addEventListener('pointerup', () => { drag.on = false; });
     this.canvas.addEventListener('wheel', e => {
       e.preventDefault();
-      this.scale = Math.min(400, Math.max(0.05, this.scale * Math.exp(-e.deltaY * 0.0015)));
-      this.redraw();
+      this.zoom(Math.exp(-e.deltaY * 0.0015));
     }, { passive: false });
+  }
+  zoom(times) {
+    this.scale = Math.min(400, Math.max(0.05, this.scale * times));
+    this.redraw();
   }
   move(right, up) {
     const c = Math.cos(this.yaw), s = Math.sin(this.yaw), along = up / Math.max(0.2, Math.sin(this.pitch)) / this.scale;

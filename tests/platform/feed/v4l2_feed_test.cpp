@@ -1,6 +1,7 @@
 #include "platform/feed/v4l2_feed.hpp"
 
 #include <fcntl.h>
+#include <gtest/gtest.h>
 #include <linux/videodev2.h>
 
 #include <algorithm>

@@ -192,6 +192,22 @@ TEST(McapReader, ReadsAMutatedFileToItsDamage) {
   EXPECT_LT(unharmed, 300);  // in what no CRC covers, such as the header's texts
 }
 
+TEST(McapReader, TakesNoMessageOutOfAnIndex) {
+  const MemorySink sink = test::sample_log(2, 100);
+  const Read whole = read_all(scratch_file("whole.mcap", sink.bytes));
+  int outside = 0;
+  for (std::size_t at = sink.bytes.find('\x07'); at != std::string::npos;
+       at = sink.bytes.find('\x07', at + 1)) {
+    std::string bytes = sink.bytes;
+    bytes[at] = '\x05';  // the opcode of a message, one bit away from that of an index
+    const Read read = read_all(scratch_file("mutated.mcap", bytes));
+    outside += read.damage.find("a message outside of the chunks") != std::string::npos ? 1 : 0;
+    ASSERT_LE(read.messages.size(), whole.messages.size()) << at;
+    EXPECT_TRUE(std::equal(read.messages.begin(), read.messages.end(), whole.messages.begin())) << at;
+  }
+  EXPECT_GE(outside, 2) << "the indexes of each chunk";
+}
+
 std::string damage_of(const std::string& bytes) { return read_all(scratch_file("bad.mcap", bytes)).damage; }
 
 TEST(McapReader, SaysWhatIsWrongInOneLine) {

@@ -24,8 +24,8 @@ json story_in(const std::string& path) { return json::parse(story_of(path).page.
 
 TEST(FlightStory, HoldsWhatTheLogHolds) {
   const FlightStory told = story_of(sample(20.0));
-  EXPECT_TRUE(told.damage.empty()) << told.damage;
-  EXPECT_EQ(told.page.title, "Flight sample");
+  EXPECT_TRUE(told.end.damage.empty()) << told.end.damage;
+  EXPECT_EQ(told.page.title, "Flight log sample.mcap");
   EXPECT_EQ(told.page.footer, "From sample.mcap. Flown by roborun, commit 0123abc, GNU.");
   const json s = json::parse(told.page.story);
   EXPECT_EQ(s["facts"][0], (json{"outcome", "landed"}));
@@ -126,7 +126,7 @@ TEST(FlightStory, OfACutLogGoesToTheCut) {
   const std::string whole = input::read_text(path, "the sample");
   input::write_file(path, whole.substr(0, whole.size() / 2));
   const FlightStory told = story_of(path);
-  EXPECT_NE(told.damage.find("sample.mcap: byte"), std::string::npos) << told.damage;
+  EXPECT_NE(told.end.damage.find("sample.mcap: byte"), std::string::npos) << told.end.damage;
   const json s = json::parse(told.page.story);
   EXPECT_GT(s["state"]["time_s"].size(), 20U);
   EXPECT_LT(s["state"]["time_s"].size(), 190U);

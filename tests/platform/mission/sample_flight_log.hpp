@@ -156,8 +156,8 @@ inline void write_sample_log(const std::string& path, double length_s) {
   }
   const auto end_ns = static_cast<std::int64_t>(1e9 * length_s);
   log.event(end_ns, log::Level::kInfo, "end", "the flight ended: landed <at> the end");
-  log.result(end_ns, R"({"reason":"landed","mission_time_s":)" + std::to_string(length_s) +
-                         R"(,"decisions":)" + std::to_string(decisions) + "}");
+  log.result(end_ns, R"({"reached_goal":false,"collided":false,"reason":"landed","mission_time_s":)" +
+                         std::to_string(length_s) + R"(,"decisions":)" + std::to_string(decisions) + "}");
   log.finish();
 }
 

@@ -171,8 +171,8 @@ TEST(AuditReport, HasTheKeysThatMachinesRead) {
 
 TEST(AuditReport, HtmlNeedsNothingFromOutsideAndEscapesText) {
   const std::string html = audit_html(sample());
-  EXPECT_EQ(html.find("http"), std::string::npos);
-  EXPECT_EQ(html.find("src="), std::string::npos);
+  for (const char* request : {"<script", "http:", "https:", "src=", "@import", "url("})
+    EXPECT_EQ(html.find(request), std::string::npos) << request;
   EXPECT_EQ(html.find("<few>"), std::string::npos);
   EXPECT_NE(html.find("&lt;few&gt; &amp; far"), std::string::npos);
   std::size_t plots = 0;
@@ -310,7 +310,7 @@ TEST(Verdict, PassesWhatMeetsEveryRequirementAndSaysSoFirst) {
   for (const char* key : {"name", "limit", "value", "pass", "is_default"})
     EXPECT_TRUE(j["requirements"][0].contains(key));
   const std::string html = audit_html(r);
-  EXPECT_LT(html.find("Verdict: PASS"), html.find("<table>"));
+  EXPECT_LT(html.find("Verdict: PASS"), html.find("<table"));
 }
 
 TEST(Verdict, FailsByEachFigureByName) {

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Flights with --live: what a viewer sees of them, that viewers cost them nothing, and what a kill leaves of their logs.
-# usage: live_view_test.sh ROBORUN ROOT [KILLS]    with KILLS: so many flights that are killed at random moments, and nothing else
+# usage: live_view_test.sh ROBORUN ROOT [KILLS|browser]    with KILLS: so many flights that are killed at random moments, and nothing else;
+# browser: one flight with its page in Chromium. Exit code 77: no Chromium.
 set -uo pipefail
 roborun=$1 root=$2 kills=${3:-0}
 folder=$(mktemp -d)
@@ -55,6 +56,21 @@ assert 2 < len(times["/state"]) / last < 11, "states: at most ten times a second
 assert numbers == list(range(numbers[0], numbers[-1] + 1)) and len(numbers) > 10, f"each decision once: {numbers}"
 PY
 }
+# The page in a browser, beside a viewer that reads nothing.
+shows_it_in_a_browser() {
+  start || return 1
+  python3 "$here/viewer.py" "$port" /state /decision /map >/dev/null 2>&1 &
+  stopped=$!
+  local i browser
+  for i in $(seq 900); do [[ $(grep -c '^/decision' "$folder/seen") -ge 1 ]] && break; sleep 0.1; done
+  kill -STOP $stopped
+  python3 "$here/live_in_chromium.py" "$port" "${ROBORUN_SHOTS:-}"
+  browser=$?
+  ends 0 $run && is True run reached_goal && is 0 run heap_calls_after_start || return 1
+  kill -9 $stopped
+  [[ $browser -eq 77 ]] && skipped=77
+  [[ $browser -eq 0 || $browser -eq 77 ]]
+}
 # How much of the flight is not in what a kill leaves: at most the last second, measured by what a viewer has seen.
 kill_leaves_the_log() {
   start || return 1
@@ -74,12 +90,14 @@ print(f"killed after {seen:.1f} s, lost {seen - whole:.2f} s")
 sys.exit(0 if seen - whole <= 1.0 else 1)
 PY
 }
-failed=0
-if [[ $kills -gt 0 ]]; then
+failed=0 skipped=0
+if [[ $kills == browser ]]; then
+  tries "a browser shows the flight" shows_it_in_a_browser || failed=1
+elif [[ $kills -gt 0 ]]; then
   for k in $(seq "$kills"); do kill_leaves_the_log || { echo "kill $k failed"; failed=$((failed + 1)); }; done
 else
   tries "a viewer sees the flight" shows_a_flight || failed=1
   tries "a kill leaves the log until a second before" kill_leaves_the_log || failed=1
 fi
 echo "$failed failed"
-exit $((failed > 0))
+exit $((failed > 0 ? 1 : skipped))
