@@ -172,17 +172,23 @@ def use(page, folder):
     page.scheme("light")
 
 
+def from_page(request, url):
+    """The page itself, or what it made of its own parts."""
+    return request in (url, "about:blank") or request.startswith("blob:null/")
+
+
 def complaints(events, url):
     found = []
     for event in events:
         method, parameters = event.get("method"), event.get("params", {})
         if method == "Runtime.exceptionThrown":
-            found.append(parameters["exceptionDetails"].get("text", "exception"))
+            details = parameters["exceptionDetails"]
+            found.append(details.get("exception", {}).get("description") or details.get("text", "exception"))
         if method == "Runtime.consoleAPICalled" and parameters["type"] in ("error", "warning"):
             found.append(str(parameters["args"]))
         if method == "Log.entryAdded" and parameters["entry"]["level"] in ("error", "warning"):
             found.append(parameters["entry"]["text"])
-        if method == "Network.requestWillBeSent" and parameters["request"]["url"] not in (url, "about:blank"):
+        if method == "Network.requestWillBeSent" and not from_page(parameters["request"]["url"], url):
             found.append("request: " + parameters["request"]["url"][:200])
     return found
 
@@ -216,4 +222,5 @@ def main():
     return 1 if failures else 0
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main())
