@@ -123,7 +123,8 @@ report::DecisionRecord record_of(const log::DecisionEntry& e) {
   return r;
 }
 
-constexpr const char* kCustom = "custom";  // what the caller brought, in reports
+constexpr const char* kCustom = "custom";     // what the caller brought, in reports
+constexpr const char* kNoFile = "/dev/null";  // a log for its viewer alone
 
 double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0.0;
@@ -245,8 +246,10 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
                                         companion_config(*config.autopilot, config.flight.vehicle))
                                   : nullptr),
       cameras_(faults_.connect(rig_.cameras())),
-      log_(config.log.empty() ? nullptr : std::make_unique<log::FlightLog>(config.log, false)),
-      recorder_(log_ && why_not_replayed(config).empty()
+      log_(config.log.empty() && config.viewer == nullptr
+               ? nullptr
+               : std::make_unique<log::FlightLog>(config.log.empty() ? kNoFile : config.log, false)),
+      recorder_(!config.log.empty() && why_not_replayed(config).empty()
                     ? std::make_unique<FlightRecorder>(*log_, aircraft_, cameras_, rig_.lidars())
                     : nullptr),
       setup_(flight_config_, config.backends, image_limits(config),
@@ -266,6 +269,7 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
   if (!faults_.empty()) aircraft_.connect(faults_.line());
   if (!config.flight.answers) aircraft_.ignore_kill_switch();
   if (!log_) return;
+  if (config.viewer != nullptr) log_->show_to(*config.viewer);
   begin_log(*log_, recorded_flight_of(flight_config_, config_, cameras_, rig_.lidars()),
             why_not_replayed(config_), config_.profile_name, world_.start_W(), config_.source);
   log_->world(shapes_json(world_));

@@ -11,6 +11,7 @@
 #include "governor/failsafe/arbiter.hpp"
 #include "platform/board/backends.hpp"
 #include "platform/flight/flight_config.hpp"
+#include "platform/log/log_viewer.hpp"
 #include "platform/mission/autopilot_choice.hpp"
 #include "platform/mission/route.hpp"
 #include "platform/mission/setting_change.hpp"
@@ -83,6 +84,8 @@ struct MissionConfig {
   std::vector<GivenGoals> goals{};   ///< Besides the world's, by time.
   std::vector<TimedFault> faults{};  ///< At most sitl::FaultLine::kMost.
   std::string log{};                 ///< File for the log of the flight; empty: none.
+  /// Gets the messages of a log as they come, but no inputs, with a file or without; null: nobody.
+  log::LogViewer* viewer{nullptr};
   std::string
       source{};  ///< For the log: the files and options it is flown by, a JSON object that its maker reads; or empty.
   bool keep_known{false};  ///< report.known, at the height of the world's start.

@@ -115,18 +115,24 @@ def check(what, good):
         failures.append(what)
 
 
+def from_page(request, url):
+    """The page itself, or what it made of its own parts."""
+    return request in (url, "about:blank") or request.startswith("blob:null/")
+
+
 def complaints(events, url):
     """Errors and warnings of the console, and requests to anywhere but the page itself and the flight that serves it."""
     found = []
     for event in events:
         method, parameters = event.get("method"), event.get("params", {})
         if method == "Runtime.exceptionThrown":
-            found.append(parameters["exceptionDetails"].get("text", "exception"))
+            details = parameters["exceptionDetails"]
+            found.append(details.get("exception", {}).get("description") or details.get("text", "exception"))
         if method == "Runtime.consoleAPICalled" and parameters["type"] in ("error", "warning"):
             found.append(str(parameters["args"]))
         if method == "Log.entryAdded" and parameters["entry"]["level"] in ("error", "warning"):
             found.append(parameters["entry"]["text"])
-        if method == "Network.requestWillBeSent" and parameters["request"]["url"] not in (url, "about:blank"):
+        if method == "Network.requestWillBeSent" and not from_page(parameters["request"]["url"], url):
             found.append("request: " + parameters["request"]["url"][:200])
         if method == "Network.webSocketCreated" and parameters["url"] != url.replace("http:", "ws:"):
             found.append("web socket: " + parameters["url"][:200])

@@ -35,9 +35,26 @@ function add(list, one) {
   return true;
 }
 
+/** Puts messages into the story of a page, which is drawn again as it grows. */
+class Growth {
+  static kRenew_ms = 1000;
+  constructor(page) { Object.assign(this, { page, renewed: performance.now(), stale: false }); }
+  /** `messages`: [topic, time in seconds, message] each. */
+  take(messages) {
+    const taken = messages.filter(([topic, t, m]) => kTake[topic]?.(this.page.story, t, m));
+    if (taken.length === 0) return;
+    this.stale ||= taken.some(([topic]) => topic !== '/state');
+    this.page.grow(Math.max(...taken.map(([, t]) => t)));
+    if (this.stale && performance.now() - this.renewed >= Growth.kRenew_ms) this.renew();
+  }
+  renew() {
+    this.renewed = performance.now(); this.stale = false;
+    this.page.renew(); this.page.draw();
+  }
+}
+
 function follow_flight(page) {
-  const socket = new WebSocket(`ws://${location.host}/`, 'foxglove.websocket.v1'), topic = {}, kRenew_ms = 1000;
-  let renewed = performance.now(), stale = false;
+  const socket = new WebSocket(`ws://${location.host}/`, 'foxglove.websocket.v1'), topic = {}, growth = new Growth(page);
   socket.binaryType = 'arraybuffer';
   socket.addEventListener('message', e => {
     if (typeof e.data === 'string') {
@@ -46,16 +63,11 @@ function follow_flight(page) {
       if (channels.length) socket.send(JSON.stringify({ op: 'subscribe', subscriptions: channels.map(c => ({ id: c.id, channelId: c.id })) }));
       return;
     }
-    const view = new DataView(e.data), t = Number(view.getBigInt64(5, true)) / 1e9, name = topic[view.getUint32(1, true)];
-    if (!kTake[name]?.(page.story, t, JSON.parse(new TextDecoder().decode(new Uint8Array(e.data, 13))))) return;
-    stale = stale || name !== '/state';
-    page.grow(t);
-    if (!stale || performance.now() - renewed < kRenew_ms) return;
-    renewed = performance.now(); stale = false;
-    page.renew(); page.draw();
+    const view = new DataView(e.data), t = Number(view.getBigInt64(5, true)) / 1e9;
+    growth.take([[topic[view.getUint32(1, true)], t, JSON.parse(new TextDecoder().decode(new Uint8Array(e.data, 13)))]]);
   });
   socket.addEventListener('close', () => {
-    page.renew(); page.draw();
+    growth.renew();
     $('note').textContent = ['The flight has ended, or its program has. Its log has all of it: roborun report.', ...page.story.notes].join('\n');
   });
 }

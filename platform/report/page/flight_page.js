@@ -2,10 +2,10 @@
 
 const $ = id => document.getElementById(id);
 
-async function read_story() {
+/** What is embedded in the page, deflated and in base64. */
+async function unpack() {
   const bytes = Uint8Array.from(atob($('story').textContent.trim()), c => c.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'));
-  return JSON.parse(await new Response(stream).text());
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate')));
 }
 
 function read_theme() {
@@ -71,16 +71,19 @@ class Page {
     this.charts = charts_of(story, this.axis, choose);
     this.choose = choose;
     Object.assign($('time'), { min: this.axis.from, max: this.axis.until });
-    for (const [name, value] of story.facts) {
-      const row = document.createElement('div');
-      row.append(Object.assign(document.createElement('dt'), { textContent: name }), Object.assign(document.createElement('dd'), { textContent: value }));
-      $('facts').append(row);
-    }
+    this.list_facts();
     $('note').textContent = story.notes.join('\n');
     this.list_events();
     this.listen();
     this.t = this.axis.from;
     this.repaint();
+  }
+  list_facts() {
+    $('facts').replaceChildren(...this.story.facts.map(([name, value]) => {
+      const row = document.createElement('div');
+      row.append(Object.assign(document.createElement('dt'), { textContent: name }), Object.assign(document.createElement('dd'), { textContent: value }));
+      return row;
+    }));
   }
   list_events() {
     $('events').replaceChildren();
@@ -112,7 +115,7 @@ class Page {
     window.addEventListener('resize', () => this.draw());
   }
   key(e) {
-    if (e.ctrlKey || e.altKey || e.metaKey || (e.key === ' ' && (e.target.tagName === 'BUTTON' || e.target.type === 'checkbox'))) return;
+    if (e.ctrlKey || e.altKey || e.metaKey || e.target.closest?.('form') || (e.key === ' ' && (e.target.tagName === 'BUTTON' || e.target.type === 'checkbox'))) return;
     const turn = { ArrowLeft: -1, ArrowRight: 1 }[e.key];
     if (turn) this.go(e.shiftKey ? this.t + 10 * turn : this.beside(turn));
     else if (e.key === 'Home') this.go(this.axis.from);
@@ -134,8 +137,8 @@ class Page {
     let before = performance.now();
     const frame = now => {
       if (!this.playing) return;
-      // A minute for a flight of any length, and never slower than the flight was.
-      const rate = Math.max(1, (this.axis.until - this.axis.from) / 60);
+      // If nobody says otherwise, a minute for a flight of any length, and never slower than the flight was.
+      const rate = this.rate ?? Math.max(1, (this.axis.until - this.axis.from) / 60);
       const t = this.t + rate * (now - before) / 1000;
       before = now;
       this.go(t);
@@ -195,12 +198,3 @@ class Page {
     for (const r of this.rows) r.row.classList.toggle('now', r === last);
   }
 }
-
-read_story().then(story => {
-  window.page = new Page(story);
-  if (story.live) follow_flight(window.page);
-  document.documentElement.dataset.ready = 'yes';
-}).catch(error => {
-  $('note').textContent = `This page cannot be drawn: ${error.message}. It needs a browser of 2023 or newer.`;
-  throw error;
-});

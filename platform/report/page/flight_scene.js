@@ -234,7 +234,7 @@ class Scene {
   }
   /** Free space flat, occupied cells 1 m thick, in layers, at the height of the newest slice. */
   draw_map(t, theme, z) {
-    if (this.map.slices.length === 0) return;
+    if (this.map.times.length === 0) return;  // of what was measured: the story may hold more by now
     this.map.advance(t, theme);
     if (this.map.done < 0) return;
     const height = this.map.slices[this.map.done].z_m ?? z, layers = 10;

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <string>
+#include <string_view>
+
 #include "platform/board/board_profile.hpp"
 #include "platform/sitl/world/generator.hpp"
 #include "platform/sitl/world/world_file.hpp"
@@ -17,6 +21,33 @@ MissionConfig paper_mission(governor::Design design, std::uint64_t seed) {
   config.flight.model = profile.model;
   config.seed = seed;
   return config;
+}
+
+/// Messages by topic.
+class Topics final : public log::LogViewer {
+ public:
+  std::map<std::string, int> count;
+  void add(const log::Channel& channel, const log::Schema&) override { topic_[channel.id] = channel.topic; }
+  void show(std::uint16_t channel, std::int64_t, std::string_view) noexcept override {
+    ++count[topic_[channel]];
+  }
+
+ private:
+  std::map<std::uint16_t, std::string> topic_;
+};
+
+TEST(Mission, TellsItsViewerWhatALogWouldHoldAndFliesTheSame) {
+  const sitl::World world = sitl::generate(sitl::environment("1").knobs, sitl::Mission::kPackageDelivery, 1);
+  MissionConfig config = paper_mission(governor::Design::kAware, 1);
+  const report::MissionResult alone = fly_mission(world, config, {}).result;
+  Topics viewer;
+  config.viewer = &viewer;
+  const report::MissionResult watched = fly_mission(world, config, {}).result;
+  EXPECT_EQ(watched.state_hash, alone.state_hash);
+  for (const char* once : {"/configuration", "/world", "/result"}) EXPECT_EQ(viewer.count[once], 1) << once;
+  EXPECT_EQ(viewer.count["/decision"], static_cast<int>(watched.decisions));
+  EXPECT_NEAR(viewer.count["/state"], 40.0 * watched.mission_time_s, 2.0);
+  EXPECT_GT(viewer.count["/map"], 10);
 }
 
 TEST(Mission, FliesTheMiddleEnvironmentWithoutACollisionAndRepeats) {
