@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -17,11 +18,12 @@ namespace {
 
 constexpr std::uint16_t kSide = 32;
 
-/// Looks down an axis from the middle of a hall of 20 x 16 x 6 m with pillars and crates.
+/// Looks down an axis from the middle of a hall of 20 x 16 x 6 m, with pillars and crates unless it is bare.
 class Hall {
  public:
-  Hall() {
+  explicit Hall(bool is_bare = false) {
     view_.free_W = Aabb{Vector3(-10, -8, 0), Vector3(10, 8, 6)};
+    if (is_bare) return;
     for (const Vector3& at_W :
          {Vector3(5, 2, 0), Vector3(6, -2.5, 0), Vector3(3.5, -4, 0), Vector3(8, 4.5, 0)})
       view_.occupied.push_back(Aabb{at_W, at_W + Vector3(0.6, 0.6, 6)});
@@ -52,10 +54,13 @@ class Hall {
     return posed();
   }
   /// A body in front of what is there, over the left part of the image.
-  [[nodiscard]] stages::PosedDepthFrame behind_body(int columns) {
+  [[nodiscard]] stages::PosedDepthFrame behind_body(int columns, float body_m = 2.0F) {
     stages::PosedDepthFrame frame = image(0, 0);
     for (int v = 0; v < kSide; ++v)
-      for (int u = 0; u < columns; ++u) depth_m_[static_cast<std::size_t>(v * kSide + u)] = 2.0F;
+      for (int u = 0; u < columns; ++u) {
+        float& depth_m = depth_m_[static_cast<std::size_t>(v * kSide + u)];
+        depth_m = std::min(depth_m, body_m);
+      }
     return frame;
   }
 
@@ -109,6 +114,12 @@ TEST(CameraWatch, FogAndBodiesAreNoTurn) {
   for (const int columns : {8, 16, 24})
     EXPECT_NE(agreement_of(hall.behind_body(columns), hall.view()), Agreement::kTurned) << columns;
   EXPECT_EQ(agreement_of(hall.behind_body(8), hall.view()), Agreement::kAgrees);
+}
+
+// Turned, all of it would lie where known space ends.
+TEST(CameraWatch, ABodyBesideAWallIsNoTurn) {
+  Hall hall(true);
+  EXPECT_EQ(agreement_of(hall.behind_body(4, 7.0F), hall.view()), Agreement::kAgrees);
 }
 
 TEST(CameraWatch, KnowsNothingOfSpaceThatNobodyKnowsNorOfAnEmptyImage) {
