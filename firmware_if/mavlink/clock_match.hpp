@@ -28,7 +28,7 @@ class ClockMatch {
 
   /// When the next question is due.
   [[nodiscard]] bool due(MonotonicTime now) const noexcept {
-    return now - asked_at_ >= (count_ < kWindow ? Nanos{100'000'000} : Nanos{500'000'000});
+    return now - asked_at_ >= (count_ - oldest_ < kWindow ? Nanos{100'000'000} : Nanos{500'000'000});
   }
   /// The time stamp of a question that leaves now: autopilots answer to nobody, so an answer is known by it.
   [[nodiscard]] std::int64_t question(MonotonicTime now) noexcept {

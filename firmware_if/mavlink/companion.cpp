@@ -334,7 +334,8 @@ void Companion::take_state(MonotonicTime now, std::int64_t boot_ns, AutopilotSta
     ++counters_.stale_states;
     return;
   }
-  if (has_state_) {
+  const bool same_clock = std::exchange(clock_moves_, clock_.counters().moved) == clock_.counters().moved;
+  if (has_state_ && same_clock) {
     // No reset counter in LOCAL_POSITION_NED: a step that no flight makes.
     const double dt_s = seconds(s.stamp - state_.stamp);
     double square = 0.0;

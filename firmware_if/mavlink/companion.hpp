@@ -200,6 +200,8 @@ class Companion final : public Autopilot {
   bool has_attitude_{false};
   AutopilotState state_{};
   bool has_state_{false}, is_new_{false};
+  std::uint64_t clock_moves_{
+      0};             ///< Of the newest state: two with a move between them say nothing of a jump.
   bool came_{false};  ///< A state, since the last command().
   std::uint8_t reset_counter_{0};
 };

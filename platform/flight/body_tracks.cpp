@@ -37,6 +37,13 @@ Vector3 at_most(const Vector3& v_W, double most_mps) noexcept {
 
 double level_m(const Vector3& way) noexcept { return core::hypot2(way.x(), way.y()); }
 
+Vector3 behind(const Vector3& place_W, const Vector3& p_WB) noexcept {
+  const Vector3 sight = place_W - p_WB;
+  const double sight_m = level_m(sight);
+  if (!(sight_m > 0.0)) return Vector3::Zero();
+  return kBehind_m / sight_m * Vector3(sight.x(), sight.y(), 0.0);
+}
+
 }  // namespace
 
 bool BodyTracks::is_sure(const Track& track, MonotonicTime now) noexcept {
@@ -45,7 +52,7 @@ bool BodyTracks::is_sure(const Track& track, MonotonicTime now) noexcept {
 
 bool BodyTracks::is_followed(const Track& track, MonotonicTime now) noexcept {
   if (track.sightings == 0 || now - track.seen > kLasts) return false;
-  return track.sightings < kProbation || now - track.moved <= kLasts;
+  return track.sightings < kProbation || now <= track.moved + kLasts;
 }
 
 BodyTracks::Track* BodyTracks::continued_by(const Vector3& place_W, MonotonicTime now) noexcept {
@@ -63,17 +70,17 @@ BodyTracks::Track* BodyTracks::continued_by(const Vector3& place_W, MonotonicTim
   return nearest;
 }
 
-void BodyTracks::begin(const Vector3& place_W, MonotonicTime now) noexcept {
+void BodyTracks::begin(const Vector3& place_W, const Vector3& p_WB, MonotonicTime now) noexcept {
   const auto worth = [now](const Track& track) {
-    const bool moves = track.sightings >= kSure && now - track.moved <= kLasts;
+    const bool moves = track.sightings >= kSure && now <= track.moved + kLasts;
     return std::pair((track.sightings > 0 ? 1 : 0) + (moves ? 1 : 0), track.seen);
   };
   Track& least = *std::min_element(track_.begin(), track_.end(),
                                    [&](const Track& a, const Track& b) { return worth(a) < worth(b); });
-  least = {.p_W = place_W, .seen = now, .sightings = 1};
+  least = {.p_W = place_W, .seen = now, .behind_W = behind(place_W, p_WB), .sightings = 1};
 }
 
-void BodyTracks::observe(MonotonicTime now, std::span<const Vector3> places_W) noexcept {
+void BodyTracks::observe(MonotonicTime now, const Vector3& p_WB, std::span<const Vector3> places_W) noexcept {
   for (const Vector3& place_W : places_W) {
     // A part of a body that was followed to here already says nothing new.
     const bool known = std::any_of(track_.begin(), track_.end(), [&](const Track& track) {
@@ -82,14 +89,14 @@ void BodyTracks::observe(MonotonicTime now, std::span<const Vector3> places_W) n
     if (known) continue;
     Track* track = continued_by(place_W, now);
     if (track == nullptr) {
-      begin(place_W, now);
+      begin(place_W, p_WB, now);
       continue;
     }
-    see(*track, place_W, now);
+    see(*track, place_W, p_WB, now);
   }
 }
 
-void BodyTracks::see(Track& track, const Vector3& place_W, MonotonicTime now) noexcept {
+void BodyTracks::see(Track& track, const Vector3& place_W, const Vector3& p_WB, MonotonicTime now) noexcept {
   const double dt_s = seconds(now - track.seen);
   const Vector3 expected_W = at_W(track, now);
   const Vector3 residual = place_W - expected_W;
@@ -97,15 +104,17 @@ void BodyTracks::see(Track& track, const Vector3& place_W, MonotonicTime now) no
   track.v_W = at_most(track.v_W + (gain / dt_s) * residual, kFastest_mps);
   track.p_W = expected_W + (track.sightings == 1 ? 1.0 : kPositionGain) * residual;
   track.seen = now;
+  track.behind_W = behind(place_W, p_WB);
   ++track.sightings;
   if (is_sure(track, now)) track.moved = now;
 }
 
-void BodyTracks::follow(MonotonicTime now, std::span<const stages::CloudPoint> points) noexcept {
+void BodyTracks::follow(MonotonicTime now, const Vector3& p_WB,
+                        std::span<const stages::CloudPoint> points) noexcept {
   for (Track& track : track_) {
     if (track.seen >= now || !is_followed(track, now)) continue;
     const auto middle_W = surface_middle_W(at_W(track, now), points);
-    if (middle_W) see(track, *middle_W, now);
+    if (middle_W) see(track, *middle_W, p_WB, now);
   }
 }
 
@@ -136,14 +145,6 @@ BodyTracks::Meeting BodyTracks::meets(const Trajectory& trajectory, MonotonicTim
   Meeting meeting;
   std::array<double, kMost> before_m{};
   before_m.fill(kNever);
-  std::array<Vector3, kMost> behind{};
-  const Vector3 eye_W = trajectory.at(from).p_W;
-  for (std::size_t k = 0; k < kMost; ++k) {
-    const Vector3 sight = at_W(track_[k], from) - eye_W;
-    const double sight_m = level_m(sight);
-    behind[k] =
-        sight_m > 0.0 ? Vector3(kBehind_m / sight_m * Vector3(sight.x(), sight.y(), 0.0)) : Vector3::Zero();
-  }
   for (int i = 0; static_cast<double>(i) * kStep_s <= kHorizon_s; ++i) {
     const double t_s = static_cast<double>(i) * kStep_s;
     const MonotonicTime time = from + from_seconds(t_s);
@@ -151,7 +152,7 @@ BodyTracks::Meeting BodyTracks::meets(const Trajectory& trajectory, MonotonicTim
     for (std::size_t k = 0; k < kMost; ++k) {
       const Track& track = track_[k];
       if (!is_sure(track, from)) continue;
-      const Vector3 way = at_W(track, time) + behind[k] - at.p_W;
+      const Vector3 way = at_W(track, time) + track.behind_W - at.p_W;
       const double distance_m = level_m(way);
       const bool nearer = distance_m < before_m[k];
       before_m[k] = distance_m;

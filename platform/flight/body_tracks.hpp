@@ -23,10 +23,10 @@ class BodyTracks {
 
   /// Places of one decision where surfaces were seen in space known to be free, at this instant. Beyond `kMost` places the
   /// one that was not seen for longest is forgotten, bodies that move last.
-  void observe(MonotonicTime now, std::span<const Vector3> places_W) noexcept;
+  void observe(MonotonicTime now, const Vector3& p_WB, std::span<const Vector3> places_W) noexcept;
   /// After observe(), with all surfaces of this decision: what appeared not long ago, or is known to move, is looked for
   /// where it should be now. What is slow stays for long in cells that are not free, and appears once. O(tracks x points).
-  void follow(MonotonicTime now, std::span<const stages::CloudPoint> points) noexcept;
+  void follow(MonotonicTime now, const Vector3& p_WB, std::span<const stages::CloudPoint> points) noexcept;
   /// Bodies whose motion is known at this instant.
   [[nodiscard]] std::size_t count(MonotonicTime now) const noexcept;
   /// One of them is nearer than this, and not behind what flies here at this velocity.
@@ -51,11 +51,12 @@ class BodyTracks {
     Vector3 p_W = Vector3::Zero();
     Vector3 v_W = Vector3::Zero();
     MonotonicTime seen{};
-    MonotonicTime moved{};  ///< When it was last seen to move.
+    MonotonicTime moved = MonotonicTime::min();  ///< When it was last seen to move.
+    Vector3 behind_W = Vector3::Zero();          ///< From what was seen of it to its middle.
     int sightings{0};
   };
   /// It was seen here now.
-  static void see(Track& track, const Vector3& place_W, MonotonicTime now) noexcept;
+  static void see(Track& track, const Vector3& place_W, const Vector3& p_WB, MonotonicTime now) noexcept;
   /// Where it is at this instant.
   [[nodiscard]] static Vector3 at_W(const Track& track, MonotonicTime time) noexcept {
     return track.p_W + seconds(time - track.seen) * track.v_W;
@@ -65,7 +66,7 @@ class BodyTracks {
   [[nodiscard]] static bool is_followed(const Track& track, MonotonicTime now) noexcept;
   /// The track that this place continues, or null.
   [[nodiscard]] Track* continued_by(const Vector3& place_W, MonotonicTime now) noexcept;
-  void begin(const Vector3& place_W, MonotonicTime now) noexcept;
+  void begin(const Vector3& place_W, const Vector3& p_WB, MonotonicTime now) noexcept;
 
   std::array<Track, kMost> track_{};
 };

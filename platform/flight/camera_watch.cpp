@@ -18,7 +18,7 @@ constexpr double kSigmas = 3.0;
 constexpr int kLeastSurfaces = 6;  // of a part that counts
 constexpr int kLeastParts = 3;
 // A quarter of the image: a body in front of the open sky is no measure of a mount.
-constexpr int kLeastOfAll = 64;
+constexpr std::size_t kLeastOfAll = 64;
 
 // What turns are compared by, with candidates that may be 5 degrees beside the true one.
 constexpr double kCell_m = 0.3;
@@ -79,13 +79,10 @@ Matrix3 turn(double angle_rad, double direction_rad) noexcept {
   return Matrix3::Identity() + angle.sin * cross + (1.0 - angle.cos) * (cross * cross);
 }
 
-bool is_turned(const Surfaces& surfaces, const Pose& X_WC, const stages::MapView& known) noexcept {
+bool is_turned(const Surfaces& surfaces, const Fit& as_is, const Pose& X_WC,
+               const stages::MapView& known) noexcept {
   const int all = static_cast<int>(surfaces.size());
-  if (all < kLeastOfAll) return false;
-  const Fit as_is = fit_of(surfaces, X_WC, known);
   if (16 * as_is.in_free < all) return false;
-  const Vector3 spread = as_is.highest_W - as_is.lowest_W;
-  if (spread.x() < kBody_m && spread.y() < kBody_m) return false;
   for (const double angle_deg : kTurns_deg) {
     for (int i = 0; i < kDirections; ++i) {
       const Matrix3 R_CT = turn(angle_deg * core::kDegree, 2.0 * core::kPi * i / kDirections);
@@ -134,8 +131,14 @@ Agreement agreement_of(const stages::PosedDepthFrame& posed, const stages::MapVi
     all.contradictions += p.contradictions;
     everywhere = everywhere && 8 * p.contradictions >= p.surfaces;
   }
-  if (is_turned(surfaces, posed.X_WC, known)) return Agreement::kTurned;
-  if (parts < kLeastParts || all.surfaces < kLeastOfAll) return Agreement::kUnknown;
+  if (surfaces.size() >= kLeastOfAll) {
+    const Fit as_is = fit_of(surfaces, posed.X_WC, known);
+    const Vector3 spread = as_is.highest_W - as_is.lowest_W;
+    const bool may_be_body = spread.x() < kBody_m && spread.y() < kBody_m;
+    if (is_turned(surfaces, as_is, posed.X_WC, known))
+      return may_be_body ? Agreement::kUnknown : Agreement::kTurned;
+  }
+  if (parts < kLeastParts || surfaces.size() < kLeastOfAll) return Agreement::kUnknown;
   return everywhere && 3 * all.contradictions >= all.surfaces ? Agreement::kDisagrees : Agreement::kAgrees;
 }
 

@@ -10,7 +10,7 @@
 namespace roborun::flight {
 
 enum class Agreement : std::uint8_t {
-  kUnknown,  ///< Too few surfaces nearby, or in space of which nothing is known.
+  kUnknown,  ///< Too few surfaces nearby, or in space of which nothing is known; or what looks turned lies within 2 x 2 m, as a body that passes does.
   kAgrees,
   kDisagrees,  ///< In every part of the image that shows surfaces, many lie where the map knows free space.
   kTurned,  ///< Many do, and turned by one angle nearly all of them end known free space: the mount was bumped.
@@ -20,7 +20,7 @@ enum class Agreement : std::uint8_t {
 /// of it, and three sigma of its depth, is known to be free. What moves fills a part of the image, a turned camera errs in all of
 /// them: at least three, and a quarter of the image in all; an eighth of each part's surfaces, and a third of all.
 ///
-/// Turned: a sixteenth of the surfaces contradicts, not all of them within 2 m as a body that passes would, and one of 24 turns (8 and 16 degrees, in twelve directions) leaves at most
+/// Turned: a sixteenth of the surfaces contradicts, and one of 24 turns (8 and 16 degrees, in twelve directions) leaves at most
 /// half of these contradictions, lets half as many surfaces more lie where the map's free space ends, and at least half of all.
 /// Fog, bodies, noise and an error of the place have no such turn. Precondition: check_shape(posed) is kOk. RT-safe: O(1).
 [[nodiscard]] Agreement agreement_of(const stages::PosedDepthFrame& posed,

@@ -136,8 +136,8 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   need.reach_m = std::fmax(need.reach_m, MotionWatch::kReach_m);
   (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), need, budget, work);
   motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W}, cloud_.points(), map_.view(), budget, work);
-  bodies_.observe(in.now, motion_.appeared_W());
-  bodies_.follow(in.now, cloud_.points());
+  bodies_.observe(in.now, in.p_WB, motion_.appeared_W());
+  bodies_.follow(in.now, in.p_WB, cloud_.points());
   out.motion = motion_.moving(in.now) || bodies_.near(in.now, in.p_WB, in.v_WB, MotionWatch::kReach_m);
   // Where views leave gaps a coarse cell is rarely seen whole: in such cells nothing were visible, the governor would hurry,
   // choose coarser ones, and see as little again.
@@ -459,6 +459,7 @@ void DecisionPipeline::forget() noexcept {
   if (ways_ != nullptr) ways_->forget();
   motion_ = {};
   bodies_ = {};
+  dodges_at_ = MonotonicTime::min();
   thin_until_ = {};
   kept_W_.clear();
   look_W_.reset();

@@ -133,7 +133,7 @@ class DecisionPipeline {
     bool leaves{};     ///< The trajectory leaves a place without room.
     bool replaces{};   ///< What is flown meets a body, the trajectory later or not at all.
     bool dodges{};     ///< The trajectory goes aside, out of the way of a body.
-    bool keeps{};      ///< Nothing is better than what is flown: it meets a body latest.
+    bool keeps{};  ///< Nothing is better than what is flown: it goes aside already, or meets a body latest.
   };
 
   void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
@@ -184,11 +184,12 @@ class DecisionPipeline {
   [[nodiscard]] Vector3 undecided_W(const DecisionInput& in) const noexcept;
   /// Where what was found meets a body that moves: slower, a stop, or to the side, whatever meets none, or the latest.
   void give_way(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
-  /// Aside, a few metres in eight directions: the one that meets nothing and ends nearest to the goal. `best_s` is when what
-  /// is best so far meets a body.
-  void dodge(const DecisionInput& in, core::StageBudget& budget, double& best_s, Trajectory& best) noexcept;
+  /// Aside, a few metres in eight directions: the one that meets nothing and ends nearest to the goal. It begins where
+  /// the vehicle can stop. `best_score` is that of what is best so far (BodyTracks::Meeting).
+  void dodge(const DecisionInput& in, core::StageBudget& budget, double& best_score,
+             Trajectory& best) noexcept;
   /// A stop instead of what is flown, if that is too fast where something moves, or meets a body before it could stop, and
-  /// the stop meets one no sooner; later, if nothing but the body asks for it.
+  /// the stop meets one later. What is too fast is stopped in any case, but where only the stop would be touched.
   [[nodiscard]] std::optional<Trajectory> stop_before_body(const DecisionInput& in, bool too_fast,
                                                            const stages::MapView& known, core::Work& work,
                                                            Nanos latency) const noexcept;

@@ -42,8 +42,9 @@ std::optional<Trajectory> DecisionPipeline::stop_before_body(const DecisionInput
   auto stop = stop_before(in, MonotonicTime::max(), known, work, latency);
   if (!stop) return std::nullopt;
   // What goes aside already is not stopped in a body's way, though it is fast.
-  const double score = meets(*stop).score();
-  if (too_fast ? score < flown.score() : score <= flown.score()) return std::nullopt;
+  const BodyTracks::Meeting stopped = meets(*stop);
+  const bool goes_aside = std::isinf(flown.touch_s) && !std::isinf(stopped.touch_s);
+  if (too_fast ? goes_aside : stopped.score() <= flown.score()) return std::nullopt;
   return stop;
 }
 
@@ -140,8 +141,9 @@ void DecisionPipeline::give_way(const DecisionInput& in, core::StageBudget& budg
     if (std::isinf(free_s) || free_s >= flown.touch_s) done = consider(stop, free_s);
   }
   // To which side was decided: what touches nothing is not changed for what an estimate is wrong by.
-  const bool is_aside =
-      is_free && !done && in.committed->start_time == dodges_at_ && std::isinf(flown.touch_s);
+  const bool is_aside = is_free && !done && in.committed->start_time == dodges_at_ &&
+                        std::isinf(flown.touch_s) &&
+                        in.now < dodges_at_ + from_seconds(in.committed->duration_s());
   const double other_score = best_score;
   if (!done && !is_aside) dodge(in, budget, best_score, best);
   draft_.dodges = best_score > other_score;

@@ -278,6 +278,7 @@ bool WayMemory::renew_changed(const Cell& low, const Cell& high, core::StageBudg
     position.is_new = true;
     changed_[changed++] = block;
   }
+  is_behind_ = done < count;
   turn_ = (turn_ + done) % count;
   for (std::size_t i = 0; i < changed; ++i) find_doors(changed_[i]);
   for (std::size_t i = 0; i < changed; ++i) position_[position_of(changed_[i])].is_new = false;

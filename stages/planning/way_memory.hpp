@@ -210,6 +210,7 @@ class WayMemory final : public Ways {
   std::uint32_t free_{};  ///< First of the blocks that are not in use.
   std::size_t block_count_{};
   std::array<Cell, 512> changed_{};  ///< In this look: no more blocks than that are read anew in one.
+  bool is_behind_{false};            ///< The last look left blocks that have changed for the next one.
   std::size_t turn_{0};              ///< Of the blocks of a look, the one that the next one begins with.
   std::span<Seen> window_;
   core::PoolRecord& window_pool_;

@@ -182,6 +182,8 @@ Status WayMemory::solve(const Vector3& from_W, const Vector3& goal_W, core::Stag
   const unsigned here = room_at(place_of(from_W));
   if (here == 0 || is_doubtful_room(here)) return Status::kStartBlocked;
   status = may_lead(from_W, goal_W, budget, work);
+  // What is behind what the map knows proves nothing.
+  if (status == Status::kNoPath && is_behind_) return Status::kInfeasible;
   if (status != Status::kInfeasible || doubts_) return status;
   doubts_ = true;
   status = search(start, goal_W, budget, work);

@@ -30,7 +30,7 @@ const kTake = {
   '/events': (story, t, m) => m.name !== 'failsafe' && add(story.events, { time_s: t, text: m.message }),
 };
 function add(list, one) {
-  if (list.some(other => JSON.stringify(other) === JSON.stringify(one)) || one.time_s < (list.at(-1)?.time_s ?? 0)) return false;
+  if (list.some(other => other.time_s === one.time_s && JSON.stringify(other) === JSON.stringify(one)) || one.time_s < (list.at(-1)?.time_s ?? 0)) return false;
   list.push(one);
   return true;
 }

@@ -12,12 +12,13 @@ namespace {
 
 constexpr double kPlanned_m = 0.9;
 constexpr double kOwn_m = 0.6;
+const Vector3 kEye_W{0, 0, 3};  // where the vehicle sees them from
 
 MonotonicTime at_s(double time_s) { return MonotonicTime{from_seconds(time_s)}; }
 
 void see(BodyTracks& sut, double time_s, const Vector3& p_W) {
   const std::array<Vector3, 1> place_W{p_W};
-  sut.observe(at_s(time_s), place_W);
+  sut.observe(at_s(time_s), kEye_W, place_W);
 }
 
 /// Seen every 0.2 s up to `until_s`, crossing from the right at 2 m/s; in front of (10, 0) after 5 s.
@@ -75,6 +76,15 @@ TEST(BodyTracks, HaveTheirMiddleBehindWhatIsSeen) {
   EXPECT_NEAR(meeting.touch_s, (8.0 - kTouches_m) / 2.0 + 0.05, 0.0501);
 }
 
+// Seen from where the vehicle was, though it will have passed by when the trajectory begins.
+TEST(BodyTracks, KeepTheirMiddleWhereverTheTrajectoryBegins) {
+  BodyTracks sut;
+  for (double t = 0.0; t <= 2.0 + 1e-9; t += 0.2) see(sut, t, {2.5, -6.0 + 2.0 * t, 3});
+  // It crosses x = 2.5 in front of (2.5, 0) after one more second; what stands 1.4 m behind that meets what is 0.4 m behind.
+  EXPECT_NE(sut.meets(Trajectory::hold({4.0, 0, 3}, at_s(0.0)), at_s(2.0), kPlanned_m, kOwn_m).touch_s,
+            BodyTracks::kNever);
+}
+
 TEST(BodyTracks, PreferKeepingOffThenPassingThenStanding) {
   const BodyTracks sut = crossing_until(2.0);
   const auto score = [&](const Trajectory& t) { return sut.meets(t, at_s(2.0), kPlanned_m, kOwn_m).score(); };
@@ -119,7 +129,7 @@ TEST(BodyTracks, FollowWhatIsSlowThroughCellsThatAreNotFree) {
   double t = 0.0;
   for (; t <= 1.0; t += 0.2) see(sut, t, slow_W(t));
   ASSERT_EQ(sut.count(at_s(1.0)), 1U);
-  for (; t <= 5.0; t += 0.2) sut.follow(at_s(t), surface(slow_W(t)));
+  for (; t <= 5.0; t += 0.2) sut.follow(at_s(t), kEye_W, surface(slow_W(t)));
   ASSERT_EQ(sut.count(at_s(t)), 1U);
   // At 2 m/s it would be in front of (10, 0) after 5 s, too; the body is there until about 6 s.
   EXPECT_LT(sut.meets(straight(0.0, 2.0), at_s(4.0), kPlanned_m, kOwn_m).touch_s, 1.2);
@@ -132,7 +142,7 @@ TEST(BodyTracks, DoNotFollowWhatStands) {
   BodyTracks sut = crossing_until(1.0);
   ASSERT_EQ(sut.count(at_s(1.0)), 1U);
   const auto wall = surface(crosser_W(1.2));
-  for (double t = 1.2; t <= 3.0; t += 0.2) sut.follow(at_s(t), wall);
+  for (double t = 1.2; t <= 3.0; t += 0.2) sut.follow(at_s(t), kEye_W, wall);
   EXPECT_EQ(sut.count(at_s(3.0)), 0U);
   EXPECT_FALSE(sut.near(at_s(3.0), {5, 0, 3}, {1, 0, 0}, 15.0));
 }
@@ -146,7 +156,7 @@ TEST(BodyTracks, FollowWhatTurnsRound) {
   for (; t <= 1.0; t += 0.2) see(sut, t, turning_W(t));
   bool stood = false;
   for (; t <= 8.0; t += 0.2) {
-    sut.follow(at_s(t), surface(turning_W(t)));
+    sut.follow(at_s(t), kEye_W, surface(turning_W(t)));
     stood = stood || sut.count(at_s(t)) == 0;
   }
   EXPECT_TRUE(stood) << "one estimate said that it stands";
@@ -159,7 +169,7 @@ TEST(BodyTracks, PlacesThatStandPushOutNoBodyThatMoves) {
   std::array<Vector3, BodyTracks::kMost + 2> places_W;  // newer than it, far away
   for (std::size_t i = 0; i < places_W.size(); ++i)
     places_W[i] = Vector3(100.0 + 8.0 * static_cast<double>(i), 0.0, 3.0);
-  sut.observe(at_s(2.4), places_W);
+  sut.observe(at_s(2.4), kEye_W, places_W);
   EXPECT_EQ(sut.count(at_s(2.4)), 1U);
 }
 
@@ -170,8 +180,8 @@ TEST(BodyTracks, FollowManyAtOnceAndForgetTheOldest) {
     for (std::size_t i = 0; i < places_W.size(); ++i)
       places_W[i] = Vector3(8.0 * static_cast<double>(i), 1.5 * t, 3.0);
     const test::NoAllocScope scope;
-    sut.observe(at_s(t), places_W);
-    sut.follow(at_s(t), {});
+    sut.observe(at_s(t), kEye_W, places_W);
+    sut.follow(at_s(t), kEye_W, {});
     (void)sut.meets(straight(0.0, 2.0), at_s(t), kPlanned_m, kOwn_m);
     EXPECT_EQ(scope.count(), 0U);
   }
