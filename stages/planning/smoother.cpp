@@ -118,12 +118,41 @@ class Tries {
 bool is_rest_free(const MapView& view, const PolynomialSegment& segment, double first_s, double radius_m,
                   std::uint64_t& lookups, double& at_s) noexcept;
 
+/// The straight pieces of the course, as whoever found the path checks them: the boxes along one cover what the vehicle sweeps,
+/// and no more. Around any other chord that slants there is more than that: where a piece touches what is not free at
+/// two corners, as paths over a lattice do, no chord across that place is free, however short.
+class StraightPieces {
+ public:
+  StraightPieces(const Course& course, double radius_m) noexcept : course_(course), radius_m_(radius_m) {}
+  /// True if from .. to is what is flown of this part, on a piece of the course that is free.
+  [[nodiscard]] bool is_free(const MapView& view, std::size_t part, const Vector3& from_W,
+                             const Vector3& to_W, std::uint64_t& lookups) const noexcept {
+    if (part % 2 == 0) return false;
+    const Vector3& a_W = course_.point_W[part / 2];
+    const Vector3& b_W = course_.point_W[part / 2 + 1];
+    return is_between(from_W, a_W, b_W) && is_between(to_W, a_W, b_W) &&
+           is_segment_free(view, a_W, b_W, radius_m_, lookups);
+  }
+
+ private:
+  static bool is_between(const Vector3& p_W, const Vector3& a_W, const Vector3& b_W) noexcept {
+    constexpr double kRounding_m = 1e-7;  // the first piece after a change begins beside it
+    const Vector3 way = b_W - a_W;
+    const double share = std::clamp((p_W - a_W).dot(way) / way.squaredNorm(), 0.0, 1.0);
+    return (p_W - a_W - share * way).norm() <= kRounding_m;
+  }
+
+  const Course& course_;
+  double radius_m_;
+};
+
 /// Remembers which parts of the curve before were free: from one to the next, most are the same.
 class CheckedParts {
  public:
   /// The first part that is not free, or none.
   [[nodiscard]] std::optional<std::size_t> find_blocked(const MapView& view, const Trajectory& trajectory,
-                                                        const SegmentParts& part, double radius_m,
+                                                        const SegmentParts& part,
+                                                        const StraightPieces& straight, double radius_m,
                                                         std::uint64_t& lookups) noexcept {
     std::size_t end = 0;
     for (std::size_t first = 0; first < trajectory.segment_count; first = end) {
@@ -135,8 +164,11 @@ class CheckedParts {
       if (before.known && before.begin_W == ends.begin_W && before.end_W == ends.end_W) continue;
       before.known = false;
       double at_s = 0.0;
-      for (std::size_t k = first; k < end; ++k)
-        if (!is_rest_free(view, trajectory.segment[k], 0.0, radius_m, lookups, at_s)) return part[first];
+      bool is_free = true;
+      for (std::size_t k = first; k < end && is_free; ++k)
+        is_free = is_rest_free(view, trajectory.segment[k], 0.0, radius_m, lookups, at_s);
+      if (!is_free && !straight.is_free(view, part[first], ends.begin_W, ends.end_W, lookups))
+        return part[first];
       before = ends;
     }
     return std::nullopt;
@@ -179,10 +211,13 @@ Status Smoother::smooth(const SmoothRequest& request, const MapView& map, core::
   for (int round = 0; round < kRounds; ++round) {
     if (budget.spent(result.work)) return Status::kBudgetSpent;
     SegmentParts part{};
-    const CurveFit fit = fit_curve(tries.course(), request.start, request.limits, candidate, part);
+    const Course course = tries.course();
+    const CurveFit fit = fit_curve(course, request.start, request.limits, candidate, part);
     bool goes_on = false;
     if (fit == CurveFit::kOk) {
-      const auto blocked = checked.find_blocked(view, candidate, part, request.radius_m, result.work.units);
+      const auto blocked =
+          checked.find_blocked(view, candidate, part, StraightPieces(course, request.radius_m),
+                               request.radius_m, result.work.units);
       if (!blocked) {
         result.trajectory = candidate;
         return Status::kOk;

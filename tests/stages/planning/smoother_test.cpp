@@ -198,6 +198,28 @@ TEST(Smoother, KeepsThePointsThatANarrowPathNeeds) {
   EXPECT_TRUE(is_trajectory_free(view, result.trajectory, 0.0, 0.3, lookups));
 }
 
+TEST(Smoother, FliesAStraightPieceThatTouchesAtTwoCorners) {
+  // At (1.23, 1.23) the vehicle's box has a micrometre to walls on either side: any chord across that place has a box with more.
+  test::BoxView view = open_view();
+  const double near = 1.23 - 0.3 - 1e-6, far = 1.23 + 0.3 + 1e-6;
+  view.occupied = {{Vector3(far, -9, -9), Vector3(9, near, 9)}, {Vector3(-9, far, -9), Vector3(near, 9, 9)}};
+  const std::vector<Vector3> path{Vector3::Zero(), Vector3(4.1, 4.1, 0)};
+  SmoothRequest request = request_of(path);
+  request.radius_m = 0.3;
+  std::uint64_t lookups = 0;
+  ASSERT_TRUE(is_segment_free(view, path[0], path[1], 0.3, lookups));
+  Smoother sut;
+  core::UnlimitedBudget unlimited;
+  SmoothResult result;
+  ASSERT_EQ(sut.smooth(request, view, unlimited, result), Status::kOk);
+  const Trajectory& t = result.trajectory;
+  ASSERT_GT(t.duration_s(), 1.0);
+  for (double s = 0.0; s < t.duration_s(); s += 0.001)
+    ASSERT_TRUE(view.is_free(Aabb::around(t.at_s(s).p_W, 0.3), lookups)) << s;
+  view.occupied.push_back({Vector3(3, 3, -1), Vector3(3.1, 3.1, 1)});
+  EXPECT_EQ(sut.smooth(request, view, unlimited, result), Status::kNoPath);
+}
+
 TEST(Smoother, NamesDegenerateInput) {
   Smoother sut;
   const test::BoxView view = open_view();
