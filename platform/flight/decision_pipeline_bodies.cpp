@@ -24,6 +24,24 @@ constexpr std::array<std::array<double, 2>, 8> kDodgeWay{{{0, 1},
 constexpr double kReact_s = 1.0;      // until the next decision has an answer
 constexpr std::uint64_t kLooks = 40;  // of one prediction, counted as so many lookups
 
+/// Slower plans than the one that was found. What is too fast to slow down in front of a body may still pass it.
+core::StaticVector<double, 1 + kSlower.size()> speeds_to_try_mps(const DecisionOutput& out,
+                                                                 double fastest_mps) noexcept {
+  core::StaticVector<double, 1 + kSlower.size()> speeds_mps;
+  if (out.planner_status == Status::kStartBlocked) return speeds_mps;
+  const double limit_mps = out.decision.point.speed_limit_mps;
+  if (out.smoother_status != Status::kOk && fastest_mps > limit_mps) (void)speeds_mps.push_back(fastest_mps);
+  for (const double share : kSlower) (void)speeds_mps.push_back(share * limit_mps);
+  return speeds_mps;
+}
+
+/// To which side was decided: what touches nothing is not changed for what an estimate is wrong by.
+bool goes_aside_still(const Trajectory& committed, MonotonicTime dodges_at, MonotonicTime now,
+                      const BodyTracks::Meeting& flown) noexcept {
+  return std::isinf(flown.touch_s) && committed.start_time == dodges_at &&
+         now < dodges_at + from_seconds(committed.duration_s());
+}
+
 }  // namespace
 
 std::optional<Trajectory> DecisionPipeline::stop_before_body(const DecisionInput& in, bool too_fast,
@@ -118,15 +136,8 @@ void DecisionPipeline::give_way(const DecisionInput& in, core::StageBudget& budg
   bool done = out.smoother_status == Status::kOk && consider(draft_.trajectory);
   if (done) return;
   const double first_score = best_score;
-  core::StaticVector<double, 1 + kSlower.size()> speeds_mps;
-  if (out.planner_status != Status::kStartBlocked) {
-    // What is too fast to slow down in front of it may still pass it.
-    const double limit_mps = out.decision.point.speed_limit_mps, now_mps = draft_.start.v_W.norm();
-    if (out.smoother_status != Status::kOk && now_mps > limit_mps)
-      (void)speeds_mps.push_back(std::fmin(now_mps, config_.vehicle.speed_mps));
-    for (const double share : kSlower) (void)speeds_mps.push_back(share * limit_mps);
-  }
-  for (const double speed_mps : speeds_mps) {
+  const double fastest_mps = std::fmin(draft_.start.v_W.norm(), config_.vehicle.speed_mps);
+  for (const double speed_mps : speeds_to_try_mps(out, fastest_mps)) {
     if (done) break;
     fit(budget, radius_m(), speed_mps, out);
     done = out.smoother_status == Status::kOk && consider(draft_.trajectory);
@@ -140,10 +151,7 @@ void DecisionPipeline::give_way(const DecisionInput& in, core::StageBudget& budg
                                        draft_.smoother_work.units);
     if (std::isinf(free_s) || free_s >= flown.touch_s) done = consider(stop, free_s);
   }
-  // To which side was decided: what touches nothing is not changed for what an estimate is wrong by.
-  const bool is_aside = is_free && !done && in.committed->start_time == dodges_at_ &&
-                        std::isinf(flown.touch_s) &&
-                        in.now < dodges_at_ + from_seconds(in.committed->duration_s());
+  const bool is_aside = is_free && !done && goes_aside_still(*in.committed, dodges_at_, in.now, flown);
   const double other_score = best_score;
   if (!done && !is_aside) dodge(in, budget, best_score, best);
   draft_.dodges = best_score > other_score;
