@@ -603,17 +603,23 @@ INSTANTIATE_TEST_SUITE_P(Both, CompanionContract,
                          ::testing::Values(AutopilotKind::kPx4, AutopilotKind::kArduCopter),
                          [](const auto& p) { return p.param == AutopilotKind::kPx4 ? "Px4" : "ArduCopter"; });
 
+/// One question at now_ns, which moves on to its answer and by a rest after it. True: the answer was taken.
+bool asks(mav::ClockMatch& sut, std::int64_t& now_ns, std::int64_t offset_ns, std::int64_t there_ns,
+          std::int64_t back_ns, std::int64_t rest_ns) {
+  const std::int64_t asked = sut.question(MonotonicTime{Nanos{now_ns}});
+  const std::int64_t theirs = now_ns + there_ns + offset_ns;
+  now_ns += there_ns + back_ns;
+  const bool taken = sut.answer(MonotonicTime{Nanos{now_ns}}, theirs, asked);
+  now_ns += rest_ns;
+  return taken;
+}
+
 TEST(ClockMatch, RefusesSlowAndForeignAnswersAndKeepsTheShortest) {
   mav::ClockMatch sut;
   constexpr std::int64_t kOffset_ns = 123'456'789'000;
   std::int64_t now_ns = 1'000'000'000;
   const auto round_trip = [&](std::int64_t there_ns, std::int64_t back_ns) {
-    const std::int64_t asked = sut.question(MonotonicTime{Nanos{now_ns}});
-    const std::int64_t theirs = now_ns + there_ns + kOffset_ns;
-    now_ns += there_ns + back_ns;
-    const bool taken = sut.answer(MonotonicTime{Nanos{now_ns}}, theirs, asked);
-    now_ns += 100'000'000;
-    return taken;
+    return asks(sut, now_ns, kOffset_ns, there_ns, back_ns, 100'000'000);
   };
   for (int i = 0; i < 5; ++i) EXPECT_TRUE(round_trip(100'000, 100'000));
   ASSERT_TRUE(sut.matched());
@@ -634,12 +640,7 @@ TEST(ClockMatch, FollowsAClockThatStoodStillWithTheFirstAnswerThatProvesIt) {
   std::int64_t now_ns = 1'000'000'000;
   const auto error_ns = [&] { return sut.ours(now_ns + offset_ns).time_since_epoch().count() - now_ns; };
   const auto round_trip = [&](std::int64_t there_ns, std::int64_t back_ns) {
-    const std::int64_t asked = sut.question(MonotonicTime{Nanos{now_ns}});
-    const std::int64_t theirs = now_ns + there_ns + offset_ns;
-    now_ns += there_ns + back_ns;
-    const bool taken = sut.answer(MonotonicTime{Nanos{now_ns}}, theirs, asked);
-    now_ns += 500'000'000;
-    return taken;
+    return asks(sut, now_ns, offset_ns, there_ns, back_ns, 500'000'000);
   };
   for (int i = 0; i < 20; ++i) ASSERT_TRUE(round_trip(100'000, 100'000));
   offset_ns -= 6'000'000;
