@@ -28,9 +28,9 @@ double across_mps2(const VehicleModel& v) noexcept {
 }  // namespace
 
 FollowedLimits followed_limits(const VehicleModel& v) noexcept {
-  constexpr double kBeside = 0.5;
+  constexpr double kBehind_mps2 = 0.6;
   return {std::clamp(across_mps2(v), kLeastBraking_mps2, v.acceleration_mps2),
-          std::min(v.jerk_mps3, v.tracking_error_m / (kBeside * v.motor_lag_s))};
+          std::min(v.jerk_mps3, kBehind_mps2 / v.motor_lag_s)};
 }
 
 double level_speed_mps(const VehicleModel& v) noexcept {

@@ -205,14 +205,18 @@ double Governor::least_s(const Task& task, int level) const noexcept {
 /// either side of a gap: a gap of width g loses up to four cells, so it is passable for certain on cells of
 ///   (g - width) / 4
 /// and `cells_to_obstacle` cells must fit between the vehicle and the nearest obstacle. Then the policy:
-/// coarser only step by step, finer than 0.3 m only after failures and on narrow ways, and at most 0.6 m near the goal and on the climb.
+/// coarser only step by step, finer than 0.3 m only after failures, on narrow ways, and one level where the space asks for less than
+/// 0.6 m and the shortest decision has time for it; at most 0.6 m near the goal and on the climb.
 int Governor::asked_level(const Task& task, Decision& d) const noexcept {
   const Policy& policy = config_.policy;
   const double gap_cell_m = 0.25 * (task.profile.gap_average_m - config_.vehicle_width_m);
   d.demand_m = std::fmin(gap_cell_m, task.profile.closest_obstacle_m / policy.cells_to_obstacle);
   int level = std::min(config_.lattice.coarsest_level_within(d.demand_m), config_.coarsest_level);
   level = std::min(level, last_level_ + policy.coarser_levels_per_decision);
-  level = std::max(level, published_level());
+  const int fine = std::max(published_level() - 1, 0);
+  const bool costs_nothing =
+      d.demand_m < 2.0 * kPublishedCell_m && least_s(task, fine) <= seconds(policy.shortest);
+  level = costs_nothing ? fine : std::max(level, published_level());
   level = task.situation.narrow ? 0 : std::max(level - finer_levels(task.situation), 0);
   if (near_goal(task.situation) || task.situation.surveying)
     level = std::min(level, config_.lattice.coarsest_level_within(2.0 * kPublishedCell_m));

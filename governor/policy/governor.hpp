@@ -33,7 +33,7 @@ struct Policy {
   Nanos shortest{200'000'000};  ///< No decision shorter than this. > 0.
   /// More thinking than this makes flight slower, not better, unless the precision that the space asks for
   /// takes longer. >= shortest.
-  Nanos longest{800'000'000};
+  Nanos longest{200'000'000};
   Nanos longest_budget{15'000'000'000};  ///< The authors' cap: what a standing vehicle is given. >= longest.
   /// From this many failed decisions on, one level finer for each. [1, 100]
   int failures_until_finer{2};

@@ -93,7 +93,9 @@ DecisionPipeline::DecisionPipeline(const PipelineConfig& config, core::StageMete
 }
 
 stages::MotionLimits DecisionPipeline::limits(double speed_mps) const noexcept {
-  constexpr double kVertical_mps2 = 4.5;  // the tracker asks for 4.9 downwards, 5.9 upwards at most
+  // With half of its thrust a vehicle has half of the torque, and lags behind what turns it meanwhile: with 4.5 m/s2 mighty was 0.29 m
+  // beside its reference, with 3 m/s2 0.10 m, with this 0.08 m (24 m/s3, its hard forest, 100 s).
+  constexpr double kVertical_mps2 = 2.0;
   const VehicleModel& v = config_.vehicle;
   const auto [acceleration_mps2, jerk_mps3] = followed_limits(v);
   return {speed_mps,

@@ -123,6 +123,15 @@ TEST(FollowedLimits, DragTakesFromSpeedingUpAndLeavesTheBrakes) {
   EXPECT_LT(speeding_up_mps2(fast, 12.0), turn_mps2);
 }
 
+TEST(FollowedLimits, JerkIsWhatTheMotorsFollow) {
+  VehicleModel v;
+  v.jerk_mps3 = 30.0;
+  for (const double lag_s : {0.01, 0.025, 0.04, 0.1}) {
+    v.motor_lag_s = lag_s;
+    EXPECT_DOUBLE_EQ(followed_limits(v).jerk_mps3, std::min(30.0, 0.6 / lag_s)) << lag_s;
+  }
+}
+
 TEST(StoppingModel, DerivedAndMeasuredAgreeForTheVehicleThatWasMeasured) {
   VehicleModel derived;
   derived.measured_stopping.reset();

@@ -170,6 +170,29 @@ TEST(Governor, FineCellsAreForWhatIsNearAndEndInTime) {
   EXPECT_GT(seconds(all.point.deadline), 5.0);
 }
 
+/// Between trees, gaps of 3.4 m on the average (asked for: 0.45 m): on a board that has time for them, cells of 0.15 m.
+TEST(Governor, TakesFinerCellsWhereItIsTightAndTheyCostNothing) {
+  GovernorConfig config = paper_config(Design::kAware);
+  config.lattice = {0.15};
+  const core::CostProfile costs = core::on_lattice(core::paper_profile(), config.lattice);
+  const auto on_board = [&](double slower, double gap_m) {
+    config.model = {from_cost(core::slower(costs.of(core::StageId::kMap), slower)),
+                    from_cost(core::slower(costs.of(core::StageId::kExport), slower)),
+                    from_cost(core::slower(costs.of(core::StageId::kPlanner), slower))};
+    config.point_cloud_s = 0.37 * slower;
+    config.governor_s = 0.1 * slower;
+    config.smoother_s = 0.01 * slower;
+    SpaceProfile p = open_space(10.0, 1.0);
+    p.sensor_volume_m3 = 900.0;
+    p.gap_average_m = gap_m;
+    return Governor(config).decide(p, {0, 100.0}).solution.p0_level;
+  };
+  const double tight_m = config.vehicle_width_m + 4 * 0.45, wide_m = config.vehicle_width_m + 4 * 0.65;
+  EXPECT_EQ(on_board(0.005, tight_m), 0);
+  EXPECT_GE(on_board(0.005, wide_m), 1);
+  EXPECT_GE(on_board(0.5, tight_m), 1);
+}
+
 TEST(Governor, EveryInputHasAnAnswer) {
   Governor sut(paper_config(Design::kAware));
   SpaceProfile p = open_space(kNan, kNan);
