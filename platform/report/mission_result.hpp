@@ -69,7 +69,10 @@ struct MissionResult {
   std::string mission;
   std::string reason;        ///< Why the mission ended.
   double speed_limit_mps{};  ///< v_max of the design.
-  bool believed{true};       ///< False: a plugin took more time than the work that it counted is worth.
+  double
+      flight_Jpm{};  ///< Of energy_kJ, what the rotors took, per metre of distance_m; +infinity without one.
+  double computing_Jpm{};  ///< The rest: computer, sensors, autopilot (power.avionics_W), per metre.
+  bool believed{true};     ///< False: a plugin took more time than the work that it counted is worth.
   /// Of a plan; another key, or none.
   struct RouteRecord {
     std::size_t steps{}, done{};
@@ -95,6 +98,7 @@ struct DecisionRecord {
   double v2_m3{};
   double time_budget_s{};
   std::string budget_source;
+  std::string speed_source;
   double deadline_s{};
   double latency_s{};
   std::array<double, core::kStageCount> stage_s{};  ///< Spent.
@@ -186,6 +190,8 @@ struct MissionReport {
 [[nodiscard]] inline double velocity(const MissionResult& r) { return r.mean_velocity_mps; }
 [[nodiscard]] inline double mission_time(const MissionResult& r) { return r.mission_time_s; }
 [[nodiscard]] inline double energy(const MissionResult& r) { return r.energy_kJ; }
+[[nodiscard]] inline double flight_Jpm(const MissionResult& r) { return r.flight_Jpm; }
+[[nodiscard]] inline double computing_Jpm(const MissionResult& r) { return r.computing_Jpm; }
 [[nodiscard]] inline double latency(const MissionResult& r) { return r.latency_s.median; }
 
 /// One line. Numbers that are not finite become null.
