@@ -190,8 +190,6 @@ struct MissionReport {
 [[nodiscard]] inline double velocity(const MissionResult& r) { return r.mean_velocity_mps; }
 [[nodiscard]] inline double mission_time(const MissionResult& r) { return r.mission_time_s; }
 [[nodiscard]] inline double energy(const MissionResult& r) { return r.energy_kJ; }
-[[nodiscard]] inline double flight_Jpm(const MissionResult& r) { return r.flight_Jpm; }
-[[nodiscard]] inline double computing_Jpm(const MissionResult& r) { return r.computing_Jpm; }
 [[nodiscard]] inline double latency(const MissionResult& r) { return r.latency_s.median; }
 
 /// One line. Numbers that are not finite become null.

@@ -31,6 +31,9 @@ double cpu_per_decision(const MissionResult& r) {
   return r.decisions > 0 ? r.cpu_s / static_cast<double>(r.decisions) : kNaN;
 }
 
+double flight_per_metre(const MissionResult& r) { return r.flight_Jpm; }
+double computing_per_metre(const MissionResult& r) { return r.computing_Jpm; }
+
 double median(std::vector<double> values) {
   if (values.empty()) return kNaN;
   std::sort(values.begin(), values.end());
@@ -163,8 +166,8 @@ std::vector<DesignSummary> summarise(const std::vector<SweepRow>& rows) {
     s.velocity_mps = estimate(mine, velocity);
     s.mission_time_s = estimate(mine, mission_time);
     s.energy_kJ = estimate(mine, energy);
-    s.flight_Jpm = estimate(mine, flight_Jpm);
-    s.computing_Jpm = estimate(mine, computing_Jpm);
+    s.flight_Jpm = estimate(mine, flight_per_metre);
+    s.computing_Jpm = estimate(mine, computing_per_metre);
     s.latency_s = estimate(mine, latency);
     s.latency_s.mean = median(latencies_s);
     s.cpu_s_per_decision = estimate(mine, cpu_per_decision);
