@@ -16,6 +16,11 @@ namespace roborun::governor {
 enum class BudgetSource : std::uint8_t { kTrajectory, kVisibility, kShortest, kLongest, kFailures, kFixed };
 [[nodiscard]] const char* to_string(BudgetSource source) noexcept;
 
+/// What set the speed limit: the vehicle file, the speed that spends least (Aim), the goal, something that moves or is thin nearby,
+/// the static design, or a policy around the governor (the speed of a mission's step, or one of the reader's own).
+enum class SpeedSource : std::uint8_t { kFile, kEnergy, kGoal, kMotion, kThin, kFixed, kPolicy };
+[[nodiscard]] const char* to_string(SpeedSource source) noexcept;
+
 /// What a policy is told besides the space.
 struct Situation {
   int failures{};  ///< Decisions in a row without a trajectory.
@@ -31,10 +36,18 @@ struct Decision {
   OperatingPoint point{};
   Nanos time_budget{};  ///< Before the policy.
   BudgetSource source{};
+  SpeedSource speed_source{};
   SolverProblem problem{};
   SolverSolution solution{};
   core::StageArray<double> predicted_s{};
   double demand_m{};  ///< Coarsest cell that the space allows: min((g_avg - width) / 4, d_obs / 2).
+
+  /// Lowers the speed limit to this, if that is less. For a policy around another one.
+  void cap_speed(double speed_mps) noexcept {
+    if (!(speed_mps < point.speed_limit_mps)) return;
+    point.speed_limit_mps = speed_mps;
+    speed_source = SpeedSource::kPolicy;
+  }
 };
 
 /// Contract:

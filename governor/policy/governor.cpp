@@ -71,6 +71,28 @@ const char* to_string(BudgetSource source) noexcept {
   return "unknown";
 }
 
+const char* to_string(SpeedSource source) noexcept {
+  switch (source) {
+    case SpeedSource::kFile:
+      return "file";
+    case SpeedSource::kEnergy:
+      return "energy";
+    case SpeedSource::kGoal:
+      return "goal";
+    case SpeedSource::kMotion:
+      return "motion";
+    case SpeedSource::kThin:
+      return "thin";
+    case SpeedSource::kFixed:
+      return "fixed";
+    case SpeedSource::kPolicy:
+      return "policy";
+  }
+  return "unknown";
+}
+
+const char* to_string(Aim aim) noexcept { return aim == Aim::kEnergy ? "energy" : "time"; }
+
 Status Policy::validate() const noexcept {
   const bool times_ok = shortest > Nanos{0} && longest >= shortest && longest_budget >= longest;
   const bool precision_ok = core::within(failures_until_finer, 1, 100) &&
@@ -91,8 +113,9 @@ Status GovernorConfig::validate() const noexcept {
   for (const double fixed_s : {point_cloud_s, governor_s, smoother_s})
     ok = ok && core::within(fixed_s, 0.0, 1e6);
   ok = ok && core::above(v_max_mps, 0.0, 30.0) && core::above(vehicle_width_m, 0.0, 20.0) &&
-       core::above(thin_step_m, 0.0, 1e3) && core::above(sensor_volume_max_m3, 0.0, 1e9) &&
-       core::within(lattice.finest_m, 0.05, 0.3) && core::within(coarsest_level, 0, kPrecisionLevels - 1) &&
+       cheapest_mps > 0.0 && core::above(thin_step_m, 0.0, 1e3) &&
+       core::above(sensor_volume_max_m3, 0.0, 1e9) && core::within(lattice.finest_m, 0.05, 0.3) &&
+       core::within(coarsest_level, 0, kPrecisionLevels - 1) &&
        core::above(design_visibility_m, 0.0, 1000.0) && minor_frame > Nanos{0};
   return ok ? Status::kOk : Status::kInvalidArgument;
 }
@@ -102,7 +125,7 @@ void Governor::configure(const GovernorConfig& config) noexcept {
   config_ = config;
   switch (config.design) {
     case Design::kAware:
-      v_max_mps_ = config.v_max_mps;
+      v_max_mps_ = std::min(config.v_max_mps, config.cheapest_mps);
       break;
     case Design::kStatic:
       v_max_mps_ = kStaticSpeed_mps;
@@ -159,6 +182,7 @@ void Governor::fill_prediction(Decision& d) const noexcept {
 Decision Governor::decide_static(const SpaceProfile& profile) const noexcept {
   Decision d;
   d.source = BudgetSource::kFixed;
+  d.speed_source = SpeedSource::kFixed;
   d.solution.status = Status::kOk;
   // The knobs are fixed; the time that they take is bounded by what there is to process.
   d.solution.v0_m3 = std::min(kStaticV0_m3, profile.sensor_volume_m3);
@@ -300,14 +324,18 @@ SolverProblem Governor::problem_of(const Task& task, const Precision& precision,
 
 /// Step 6: how fast may the next trajectory be? As fast as it can still stop inside known free space, which
 /// the smoother sees to. Among thin things no farther from one decision's images to the next one's than thin_step_m.
-double Governor::speed_limit_mps(const Situation& situation, double deadline_s) const noexcept {
-  double speed_mps = v_max_mps_;
-  if (near_goal(situation)) speed_mps = std::min(speed_mps, config_.policy.near_goal_speed_mps);
-  if (situation.motion) speed_mps = std::min(speed_mps, config_.policy.motion_speed_mps);
+Governor::SpeedLimit Governor::speed_limit(const Situation& situation, double deadline_s) const noexcept {
+  const Policy& policy = config_.policy;
+  SpeedLimit limit{config_.v_max_mps, SpeedSource::kFile};
+  const auto at_most = [&limit](double speed_mps, SpeedSource source) {
+    if (speed_mps < limit.speed_mps) limit = {speed_mps, source};
+  };
+  at_most(config_.cheapest_mps, SpeedSource::kEnergy);
+  if (near_goal(situation)) at_most(policy.near_goal_speed_mps, SpeedSource::kGoal);
+  if (situation.motion) at_most(policy.motion_speed_mps, SpeedSource::kMotion);
   if (situation.thin)
-    speed_mps =
-        std::min(speed_mps, std::max(config_.thin_step_m / deadline_s, config_.policy.thin_speed_mps));
-  return speed_mps;
+    at_most(std::max(config_.thin_step_m / deadline_s, policy.thin_speed_mps), SpeedSource::kThin);
+  return limit;
 }
 
 Decision Governor::decide(const SpaceProfile& profile, const Situation& situation) noexcept {
@@ -335,13 +363,10 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
     time_s =
         std::max(time_s, sum(d.predicted_s) * (1.0 + policy.reserve_ratio) + seconds(config_.minor_frame));
   }
-  d.point = {d.solution.p0_level,
-             d.solution.p1_level,
-             d.solution.v0_m3,
-             d.solution.v1_m3,
-             d.solution.v2_m3,
-             whole_frames(time_s),
-             speed_limit_mps(situation, time_s)};
+  const SpeedLimit limit = speed_limit(situation, time_s);
+  d.speed_source = limit.source;
+  d.point = {d.solution.p0_level, d.solution.p1_level,  d.solution.v0_m3, d.solution.v1_m3,
+             d.solution.v2_m3,    whole_frames(time_s), limit.speed_mps};
   return d;
 }
 

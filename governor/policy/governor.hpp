@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <numbers>
 
 #include "core/executive/cost_profile.hpp"
@@ -23,6 +24,13 @@ enum class Design : std::uint8_t {
   kStaticFair,  ///< The same knobs; its speed comes from the same safety formula as the aware design's.
 };
 [[nodiscard]] const char* to_string(Design design) noexcept;
+
+/// What a flight is to save.
+enum class Aim : std::uint8_t {
+  kTime,    ///< As fast as is safe.
+  kEnergy,  ///< No faster than the speed that spends least per metre (core/energy_model.hpp).
+};
+[[nodiscard]] const char* to_string(Aim aim) noexcept;
 
 /// The extra rules beyond Eq. 3: one field per rule.
 struct Policy {
@@ -66,6 +74,8 @@ struct GovernorConfig {
   double smoother_s{};
   double v_max_mps{
       VehicleModel{}.speed_mps};  ///< RoboRun Table "Knob values"; the static design's is 0.5. (0, 30]
+  /// The speed that spends least per metre: flight is no faster. +infinity: of no interest. > 0.
+  double cheapest_mps{std::numeric_limits<double>::infinity()};
   /// Among thin things, the way from one look to the next on which the thinnest one is surely seen. (0, 1e3]
   double thin_step_m{1e3};
   double vehicle_width_m{2.0 * VehicleModel{}.radius_m};  ///< (0, 20]
@@ -91,8 +101,12 @@ class Governor final : public DecisionPolicy {
   void observe(core::StageId id, double predicted_s, double spent_s) noexcept override;
   /// Largest v with (visible - d_stop(v)) / (decisions_per_budget * v) >= latency; 0 if none. Closed form.
   [[nodiscard]] double safe_speed_mps(double visible_m, double latency_s) const noexcept;
-  /// Returns how fast the next trajectory may be in this situation, with decisions of this length.
-  [[nodiscard]] double speed_limit_mps(const Situation& situation, double deadline_s) const noexcept;
+  struct SpeedLimit {
+    double speed_mps;
+    SpeedSource source;
+  };
+  /// Returns how fast the next trajectory may be in this situation, with decisions of this length, and what sets that.
+  [[nodiscard]] SpeedLimit speed_limit(const Situation& situation, double deadline_s) const noexcept;
   /// Speed limit of the static designs; the aware design's upper bound.
   [[nodiscard]] double v_max_mps() const noexcept override { return v_max_mps_; }
 

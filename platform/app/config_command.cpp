@@ -68,7 +68,8 @@ int config(bool json) {
   fmt::print(
       "# Settings of a simulated mission: --settings FILE. Every key may be left out.\n"
       "# key, unit, range, default, meaning\n\n{}\n"
-      "Besides: [wind] mean_mps = [x, y, z], at most 20 m/s (default 1.5, 1, 0); [fence] altitude_m = [low, "
+      "Besides: [wind] mean_mps = [x, y, z], at most 20 m/s (default 1.5, 1, 0); [flight] aim = NAME,\n"
+      "time (default) or energy: no faster than what spends least per metre; [fence] altitude_m = [low, "
       "high],\n"
       "keep_in and keep_out = [{{ polygon = [[x, y], ...] }}, {{ circle = [x, y, radius] }}]; the models of "
       "all sensors "

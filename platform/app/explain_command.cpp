@@ -49,6 +49,7 @@ log::DecisionEntry entry_of(const Row& r) {
   log::DecisionEntry e;
   e.time_ns = from_seconds(r.number("time_s")).count();
   e.budget_source = r.text("budget_source").c_str();
+  e.speed_source = r.text("speed_source").c_str();
   e.solver = r.text("solver").c_str();
   e.ways = r.text("ways").c_str();
   e.planner = r.text("planner").c_str();

@@ -45,6 +45,7 @@ std::string to_json(const FlightSource& source) {
   }
   j["vehicle"] = absolute(source.vehicle);
   j["settings"] = absolute(source.settings);
+  if (!source.aim.empty()) j["aim"] = source.aim;
   j["profile"] = absolute(source.profile);
   return j.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -66,6 +67,7 @@ FlightSource source_from(const Json& j) {
   }
   source.vehicle = j.at("vehicle").get<std::string>();
   source.settings = j.at("settings").get<std::string>();
+  source.aim = j.value("aim", "");
   source.profile = j.at("profile").get<std::string>();
   return source;
 }
@@ -101,6 +103,7 @@ PreparedFlight prepare(const FlightSource& source, std::uint64_t seed) {
   for (const std::string& path : {source.vehicle, source.world, source.settings, source.profile})
     flight.inputs.push_back(path);
   if (!source.settings.empty()) mission::load_settings(source.settings, config);
+  if (!source.aim.empty()) config.flight.aim = mission::aim_of("--aim", source.aim);
   config.seed = seed;
   config.source = to_json(source);
   if (source.world.empty()) {

@@ -20,6 +20,7 @@ struct FlightSource {
   WorldArguments in_file;
   std::string vehicle{"paper"};
   std::string settings;
+  std::string aim;               ///< In the place of that of the settings; empty: as they say.
   std::string profile{"paper"};  ///< Loaded by the caller.
 };
 

@@ -147,6 +147,7 @@ int fly(const FlyOptions& options) {
   std::string title = flight.title;
   if (options.source.vehicle != "paper") title += fmt::format(", vehicle {}", options.source.vehicle);
   title += fmt::format(", cost profile {}", options.source.profile);
+  if (config.flight.aim == governor::Aim::kEnergy) title += ", aim energy";
 
   if (options.tune && !autopilot)
     throw InputError("--autopilot-tune: must go with --autopilot px4 or arducopter");
@@ -305,6 +306,9 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
       "the plans keep to its own");
   fly_app->add_option("--settings", options->source.settings,
                       "Cameras, wind, battery, speed from a TOML file (see platform/README.md)");
+  fly_app->add_option("--aim", options->source.aim,
+                      "time, or energy: no faster than what spends least per metre (roborun vehicle check "
+                      "says how fast that is) [that of --settings, or time]");
   fly_app->add_option(
       "--log", options->log,
       "Write what the flight read, did and why to this MCAP file, for roborun replay, Foxglove and "

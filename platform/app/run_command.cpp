@@ -46,6 +46,7 @@ struct RunOptions {
   std::string arm_line;
   bool active_low{false}, pull_up{false};
   std::string profile{"host"};
+  std::string aim{"time"};
   std::string seed{"1"};
   double cruise_m{0.0};
   double seconds{3600.0};
@@ -159,6 +160,7 @@ live::LiveConfig config_of(const RunOptions& options) {
   const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.vehicle);
   mission::set_vehicle(mission, vehicle);
   mission.seed = input::seed_of("--seed", options.seed);
+  mission.flight.aim = mission::aim_of("--aim", options.aim);
   mission.autopilot = autopilot_of(options, config.link);
   if (mission.autopilot) {
     config.autopilot = mission::companion_config(*mission.autopilot, mission.flight.vehicle);
@@ -423,6 +425,11 @@ void add_run_command(CLI::App& app, std::function<int()>& run) {
           "--profile", options->profile,
           "What the governor expects stages to cost: paper, host (measured once), or a file of roborun "
           "calibrate")
+      ->capture_default_str();
+  command
+      ->add_option("--aim", options->aim,
+                   "time, or energy: no faster than what spends least per metre (roborun vehicle check says "
+                   "how fast that is)")
       ->capture_default_str();
   command->add_option("--seed", options->seed, "Seed of the planner")->capture_default_str();
   add_number(*command, "--seconds", options->seconds, 1.0, 86400.0, "Then it lands where it is, 1 .. 86400");

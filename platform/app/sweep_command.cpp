@@ -42,6 +42,7 @@ struct SweepOptions {
   std::string planner{"own"};
   std::optional<std::string> vehicles;
   std::string settings;
+  std::string aim;
   std::string jobs{std::to_string(std::max(1U, std::thread::hardware_concurrency()))};
   std::string shard{"1/1"};
   std::string out{"out/sweep"};
@@ -132,10 +133,12 @@ void set_environments(const SweepOptions& options, evaluation::SweepPlan& plan,
     mission::MissionConfig& base = inputs.base[suite ? name : std::string{}];
     mission::set_vehicle(base, vehicle);
     if (!options.settings.empty()) mission::load_settings(options.settings, base);
+    if (!options.aim.empty()) base.flight.aim = mission::aim_of("--aim", options.aim);
     plan.vehicle += fmt::format("{}{} {}", plan.vehicle.empty() ? "" : ", ", vehicle.name, vehicle.digest);
     inputs.files.insert(inputs.files.end(), vehicle.patterns.begin(), vehicle.patterns.end());
     inputs.files.push_back(name);
   }
+  plan.aim = options.aim;
   inputs.files.push_back(options.settings);
   if (!options.settings.empty())
     plan.settings = evaluation::digest_of(input::read_text(options.settings, "a readable TOML file"));
@@ -354,6 +357,9 @@ void add_sweep_command(CLI::App& app, std::function<int()>& run) {
       "and foreign several with commas [paper; hard: paper,micro-six; foreign: of the authors' size]");
   sweep_app->add_option("--settings", options->settings,
                         "Cameras, wind, battery, speed from a TOML file (see platform/README.md)");
+  sweep_app->add_option("--aim", options->aim,
+                        "time, or energy: no faster than what spends least per metre (roborun vehicle check "
+                        "says how fast that is) [that of --settings, or time]");
   sweep_app->add_option("--jobs", options->jobs, "Missions at a time, 1 .. 1024")->capture_default_str();
   sweep_app->add_option("--shard", options->shard, "I/N: only the I-th of N equal parts")
       ->capture_default_str();

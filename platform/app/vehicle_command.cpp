@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "core/energy_model.hpp"
 #include "core/geometry/math.hpp"
 #include "platform/app/exit_code.hpp"
 #include "platform/board/backends.hpp"
@@ -33,6 +34,8 @@ struct Consequences {
   double range_m{};                             ///< Of its sensors, the shortest.
   double blind_deg{};                           ///< Widest angle to the nearest direction that is seen.
   mission::SpeedLimits speed;
+  double cheapest_mps{};
+  EnergyPerMetre least, at_top;              ///< At cheapest_mps, and at limits.speed_mps.
   Vector3 assumed_half_m = Vector3::Zero();  ///< flight::assumed_free_half_m().
   double gap_m{};                            ///< The narrowest that plans go through.
   std::size_t bytes{};                       ///< In a world of 100 x 100 x 10 m.
@@ -60,6 +63,9 @@ Consequences consequences_of(const vehicle::Vehicle& vehicle) {
   c.assumed_half_m = flight::assumed_free_half_m(v, config.flight.sees_all_around,
                                                  config.flight.level_view_ratio, config.flight.too_near_m);
   c.speed = mission::speed_limits(config.flight);
+  c.cheapest_mps = cheapest_speed_mps(v);
+  c.least = energy_per_metre(v, c.cheapest_mps);
+  c.at_top = energy_per_metre(v, v.speed_mps);
   c.gap_m = 2.0 * planned_radius_m(v);
   c.bytes = flight::FlightSystem::arena_bytes(config.flight) +
             board::backend_bytes(map_bounds_W(config.flight), images) + sizeof(flight::FlightSystem);
@@ -120,6 +126,23 @@ void print_speeds(const mission::SpeedLimits& speed) {
     fmt::print("  {:<18}{:>6.1f}  {}\n", limit.name, limit.speed_mps, limit.why);
 }
 
+nlohmann::ordered_json json_of(double speed_mps, const EnergyPerMetre& energy) {
+  return {
+      {"speed_mps", speed_mps}, {"flight_Jpm", energy.flight_Jpm}, {"computing_Jpm", energy.computing_Jpm}};
+}
+
+void print_energy(double top_mps, const Consequences& c) {
+  const auto line = [](double speed_mps, const EnergyPerMetre& e, const char* text) {
+    fmt::print("  {:>6.1f} {:>8.1f} {:>11.1f} {:>7.1f}  {}\n", speed_mps, e.flight_Jpm, e.computing_Jpm,
+               e.total_Jpm(), text);
+  };
+  fmt::print("\nJ/m in still air\n  {:>6} {:>8} {:>11} {:>7}\n", "at m/s", "flight", "computing", "both");
+  line(c.cheapest_mps, c.least,
+       c.cheapest_mps < top_mps ? "the least: --aim energy flies no faster"
+                                : "the least: --aim energy changes nothing, it never flies faster");
+  line(top_mps, c.at_top, "limits.speed_mps");
+}
+
 int check(const VehicleOptions& options) {
   const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.file);
   const Consequences c = consequences_of(vehicle);
@@ -138,6 +161,8 @@ int check(const VehicleOptions& options) {
                                 {"speed_limited_by", c.speed.lowest().name},
                                 {"speed_limits", json_of(c.speed.always)},
                                 {"speed_where", json_of(c.speed.where)},
+                                {"least_energy", json_of(c.cheapest_mps, c.least)},
+                                {"top_speed_energy", json_of(vehicle.model.speed_mps, c.at_top)},
                                 {"narrowest_gap_m", c.gap_m},
                                 {"bytes", c.bytes},
                                 {"cannot", cannot}};
@@ -162,6 +187,7 @@ int check(const VehicleOptions& options) {
              static_cast<double>(c.bytes) / 1048576.0);
   for (const std::string& line : cannot) fmt::print("it                   {}\n", line);
   print_speeds(c.speed);
+  print_energy(vehicle.model.speed_mps, c);
   return kDone;
 }
 
@@ -198,7 +224,9 @@ void add_vehicle_command(CLI::App& app, std::function<int()>& run) {
       "sight, a bound\n"
       "beside the flight, are the flight's own numbers. A plan may be slower still: around obstacles, and "
       "into "
-      "what is not seen yet.\n\n"
+      "what is not seen yet.\n"
+      "Last, what a metre costs at the speed that spends least (fly --aim energy), and at "
+      "limits.speed_mps.\n\n"
       "All keys with unit, range and meaning: roborun config. Exit code: 0, or 2: the file is wrong, or its "
       "vehicle cannot fly.");
   command->require_subcommand(1);

@@ -28,6 +28,7 @@ Json json_of(const SweepPlan& p) {
   json["vehicle"] = p.vehicle;
   json["worlds"] = p.worlds;
   json["settings"] = p.settings;
+  json["aim"] = p.aim;
   json["shard"] = fmt::format("{}/{}", p.shard, p.shards);
   return json;
 }
@@ -91,6 +92,7 @@ SweepPlan plan_from_json(const std::string& path, const std::string& text) {
     p.vehicle = json.value("vehicle", "");
     p.worlds = json.value("worlds", "");
     p.settings = json.at("settings");
+    p.aim = json.value("aim", "");
     const std::string shard = json.at("shard");
     const bool whole = std::sscanf(shard.c_str(), "%d/%d", &p.shard, &p.shards) == 2 && p.shard >= 1 &&
                        p.shard <= p.shards && !p.environments.empty() && !p.profiles.empty() &&

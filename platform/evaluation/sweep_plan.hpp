@@ -36,6 +36,7 @@ struct SweepPlan {
   std::string vehicle;   ///< Names and digests; empty in plans of before there were others.
   std::string worlds;    ///< Digest of the files of a suite, or empty.
   std::string settings;  ///< Digest of the settings file, or empty.
+  std::string aim;       ///< In the place of that of the settings, or empty.
   int shard{1};          ///< 1 .. shards.
   int shards{1};
 };

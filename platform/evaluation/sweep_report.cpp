@@ -80,6 +80,10 @@ class Page {
   std::string tables_;
 };
 
+std::string settings_of(const SweepPlan& plan) {
+  return (plan.settings.empty() ? "default" : plan.settings) + (plan.aim.empty() ? "" : ", aim " + plan.aim);
+}
+
 }  // namespace
 
 void write_suite_report(const SweepStore& store, const std::vector<report::MissionResult>& flights) {
@@ -88,9 +92,8 @@ void write_suite_report(const SweepStore& store, const std::vector<report::Missi
   page.text("Flights",
             fmt::format(
                 "{}\nvehicles {}; map {}, planner {}, settings {}; {} of {} flights\ncommit {}, program {}\n",
-                report::suite_table(flights), plan.vehicle, plan.map, plan.planner,
-                plan.settings.empty() ? "default" : plan.settings, flights.size(), store.missions().size(),
-                plan.commit, plan.build));
+                report::suite_table(flights), plan.vehicle, plan.map, plan.planner, settings_of(plan),
+                flights.size(), store.missions().size(), plan.commit, plan.build));
   page.finish();
 }
 
@@ -101,12 +104,11 @@ void write_sweep_report(const SweepStore& store) {
   for (const SweepPlan::ProfileId& id : plan.profiles) profiles.push_back(id.name);
   Page page(store, fmt::format("roborun sweep {}: {} environments, seeds {}", plan.suite,
                                plan.environments.size(), fmt::join(plan.seeds, ", ")));
-  page.text("Overall",
-            fmt::format("{}\nmission {}, map {}, planner {}, settings {}; {} of {} missions\n"
-                        "commit {}, program {}\n",
-                        report::sweep_table(rows), plan.mission, plan.map, plan.planner,
-                        plan.settings.empty() ? "default" : plan.settings, rows.size(),
-                        store.missions().size(), plan.commit.empty() ? "unknown" : plan.commit, plan.build));
+  page.text("Overall", fmt::format("{}\nmission {}, map {}, planner {}, settings {}; {} of {} missions\n"
+                                   "commit {}, program {}\n",
+                                   report::sweep_table(rows), plan.mission, plan.map, plan.planner,
+                                   settings_of(plan), rows.size(), store.missions().size(),
+                                   plan.commit.empty() ? "unknown" : plan.commit, plan.build));
   page.picture("Overall metrics", "overall.svg", report::overall_svg(rows));
   for (const std::string& profile : profiles) {
     page.picture(

@@ -50,6 +50,7 @@ std::string repeat_command(const SweepPlan& plan, const SuiteProblem& problem, c
   if (plan.map != "own") command += " --map " + plan.map;
   if (plan.planner != "own") command += " --planner " + plan.planner;
   if (!plan.settings.empty()) command += " --settings FILE";
+  if (!plan.aim.empty()) command += " --aim " + plan.aim;
   return command;
 }
 

@@ -20,8 +20,7 @@ constexpr double kGateGrows_mps = 1.5;
 constexpr double kPositionGain = 0.6;
 constexpr double kVelocityGain = 0.35;
 constexpr int kProbation = 8;      // sightings in which what appeared is followed though it has not moved
-constexpr double kBody_m = 0.9;    // around the place that was seen
-constexpr double kTouch_m = 0.6;   // the same without a reserve
+constexpr double kTouch_m = 0.6;   // kBodyReach_m without a reserve
 constexpr double kBehind_m = 0.4;  // what is seen of a body is its near side: its middle is farther away
 // What constant velocity is wrong by: more while it was estimated from few sightings.
 constexpr double kGrows_mps = 0.25;
@@ -84,7 +83,7 @@ void BodyTracks::observe(MonotonicTime now, const Vector3& p_WB, std::span<const
   for (const Vector3& place_W : places_W) {
     // A part of a body that was followed to here already says nothing new.
     const bool known = std::any_of(track_.begin(), track_.end(), [&](const Track& track) {
-      return track.sightings > 0 && track.seen == now && (track.p_W - place_W).norm() < 2.0 * kBody_m;
+      return track.sightings > 0 && track.seen == now && (track.p_W - place_W).norm() < 2.0 * kBodyReach_m;
     });
     if (known) continue;
     Track* track = continued_by(place_W, now);
@@ -160,7 +159,7 @@ BodyTracks::Meeting BodyTracks::meets(const Trajectory& trajectory, MonotonicTim
       if (i == 0 || !nearer || std::fabs(way.z()) > kHeight_m) continue;
       const double grows_mps =
           std::clamp(kGrowsBySightings_mps / track.sightings, kGrows_mps, kGrowsAtFirst_mps);
-      const double bound_m = radius_m + kBody_m + grows_mps * seconds(time - track.seen);
+      const double bound_m = radius_m + kBodyReach_m + grows_mps * seconds(time - track.seen);
       if (distance_m < bound_m && meeting.near_s == kNever) meeting.near_s = t_s;
       if (distance_m >= body_m + kTouch_m) continue;
       meeting.touch_s = t_s;

@@ -42,6 +42,8 @@ class BodyTracks {
   };
   /// How what flies this trajectory meets bodies, in seconds after `from`, while they approach each other, within the
   /// horizon. The rest after the trajectory's end counts, too. Heights apart by more than a body may be high do not meet.
+  /// What touches at `from` already is met at the second look (0.1 s) if it comes nearer still, and not met if they part: whatever
+  /// leads out of a touch is as good as keeping off.
   /// `radius_m` is planned with, `body_m` is the vehicle's own.
   [[nodiscard]] Meeting meets(const Trajectory& trajectory, MonotonicTime from, double radius_m,
                               double body_m) const noexcept;

@@ -230,9 +230,7 @@ std::optional<Trajectory> DecisionPipeline::stop_before(const DecisionInput& in,
   const MonotonicTime soonest = in.now + latency + config_.minor_frame;
   const TrajectoryPoint then = in.committed->at(soonest);
   Trajectory stop;
-  if (then.v_W.norm() <= kAtRest_mps ||
-      smoother_.brake(then, soonest, limits(config_.vehicle.acceleration_mps2), stop) != Status::kOk)
-    return std::nullopt;
+  if (then.v_W.norm() <= kAtRest_mps || brake(then, soonest, stop) != Status::kOk) return std::nullopt;
   const double stop_free_s = free_until_s(known, stop, 0.0, config_.vehicle.radius_m, work.units);
   if (!std::isinf(stop_free_s) && soonest + from_seconds(stop_free_s) < free_until) return std::nullopt;
   return stop;

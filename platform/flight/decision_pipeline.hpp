@@ -115,6 +115,14 @@ class DecisionPipeline {
  private:
   /// The vehicle's limits, at this speed, and what it can follow of them.
   [[nodiscard]] stages::MotionLimits limits(double speed_mps) const noexcept;
+  /// The quickest stop from there, as far as the vehicle can follow it.
+  [[nodiscard]] Status brake(const TrajectoryPoint& start, MonotonicTime start_time,
+                             Trajectory& stop) const noexcept {
+    return smoother_.brake(start, start_time, limits(config_.vehicle.speed_mps), stop);
+  }
+  /// How what flies this trajectory from then on meets bodies, with the room that plans keep.
+  [[nodiscard]] BodyTracks::Meeting meets(const Trajectory& trajectory, MonotonicTime from,
+                                          core::Work& work) const noexcept;
   /// The map, with the fence around it: what is planned in.
   class Permitted;
   /// The same at its finest: what is flown is checked in it. While the vehicle leaves a place

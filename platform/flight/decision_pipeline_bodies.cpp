@@ -44,23 +44,25 @@ bool goes_aside_still(const Trajectory& committed, MonotonicTime dodges_at, Mono
 
 }  // namespace
 
+BodyTracks::Meeting DecisionPipeline::meets(const Trajectory& trajectory, MonotonicTime from,
+                                            core::Work& work) const noexcept {
+  work.units += kLooks;
+  return bodies_.meets(trajectory, from, radius_m(), config_.vehicle.radius_m);
+}
+
 std::optional<Trajectory> DecisionPipeline::stop_before_body(const DecisionInput& in, bool too_fast,
                                                              const stages::MapView& known, core::Work& work,
                                                              Nanos latency) const noexcept {
   if (bodies_.count(in.now) == 0 && !too_fast) return std::nullopt;
   const MonotonicTime soonest = in.now + latency + config_.minor_frame;
-  const auto meets = [&](const Trajectory& trajectory) {
-    work.units += kLooks;
-    return bodies_.meets(trajectory, soonest, radius_m(), config_.vehicle.radius_m);
-  };
-  const BodyTracks::Meeting flown = meets(*in.committed);
+  const BodyTracks::Meeting flown = meets(*in.committed, soonest, work);
   const double speed_mps = in.committed->at(soonest).v_W.norm();
   const bool near = flown.near_s < kReact_s + speed_mps / config_.vehicle.acceleration_mps2;
   if (!near && !too_fast) return std::nullopt;
   auto stop = stop_before(in, MonotonicTime::max(), known, work, latency);
   if (!stop) return std::nullopt;
   // What goes aside already is not stopped in a body's way, though it is fast.
-  const BodyTracks::Meeting stopped = meets(*stop);
+  const BodyTracks::Meeting stopped = meets(*stop, soonest, work);
   const bool goes_aside = std::isinf(flown.touch_s) && !std::isinf(stopped.touch_s);
   if (too_fast ? goes_aside : stopped.score() <= flown.score()) return std::nullopt;
   return stop;
@@ -72,9 +74,7 @@ void DecisionPipeline::dodge(const DecisionInput& in, core::StageBudget& budget,
   const stages::FinestView finest(fenced);
   // What is too fast to go aside at once does so while it brakes.
   Trajectory stop;
-  if (smoother_.brake(draft_.start, draft_.takes_over, limits(config_.vehicle.acceleration_mps2), stop) !=
-      Status::kOk)
-    return;
+  if (brake(draft_.start, draft_.takes_over, stop) != Status::kOk) return;
   const double speed_mps =
       std::fmin(std::fmax(kDodge_mps, draft_.start.v_W.norm()), config_.vehicle.speed_mps);
   double best_rest_m = BodyTracks::kNever;
@@ -98,9 +98,7 @@ void DecisionPipeline::dodge(const DecisionInput& in, core::StageBudget& budget,
         return;
       }
       if (status != Status::kOk) continue;
-      draft_.smoother_work.units += kLooks;
-      const double score =
-          bodies_.meets(smoothed.trajectory, draft_.takes_over, radius_m(), config_.vehicle.radius_m).score();
+      const double score = meets(smoothed.trajectory, draft_.takes_over, draft_.smoother_work).score();
       const bool is_better =
           score > best_score || (score == best_score && std::isinf(score) && rest_m < best_rest_m);
       if (!is_better) continue;
@@ -114,18 +112,15 @@ void DecisionPipeline::dodge(const DecisionInput& in, core::StageBudget& budget,
 void DecisionPipeline::give_way(const DecisionInput& in, core::StageBudget& budget,
                                 DecisionOutput& out) noexcept {
   if (in.climbing || bodies_.count(in.now) == 0) return;
-  const auto meets = [&](const Trajectory& trajectory) {
-    draft_.smoother_work.units += kLooks;
-    return bodies_.meets(trajectory, draft_.takes_over, radius_m(), config_.vehicle.radius_m);
-  };
   const bool is_free = std::isinf(draft_.committed_until_s);
-  const BodyTracks::Meeting flown = meets(*in.committed);
+  const BodyTracks::Meeting flown = meets(*in.committed, draft_.takes_over, draft_.smoother_work);
   draft_.replaces = !std::isinf(flown.near_s);
   double best_score = -1.0;
   Trajectory best;
   // True: nothing can be better. Leaving known free space counts as touching.
   const auto consider = [&](const Trajectory& trajectory, double free_s = BodyTracks::kNever) {
-    const double score = std::fmin(meets(trajectory).score(), free_s);
+    const double score =
+        std::fmin(meets(trajectory, draft_.takes_over, draft_.smoother_work).score(), free_s);
     if (score > best_score) {
       best_score = score;
       best = trajectory;
@@ -143,8 +138,7 @@ void DecisionPipeline::give_way(const DecisionInput& in, core::StageBudget& budg
     done = out.smoother_status == Status::kOk && consider(draft_.trajectory);
   }
   Trajectory stop;
-  if (!done && smoother_.brake(draft_.start, draft_.takes_over, limits(config_.vehicle.acceleration_mps2),
-                               stop) == Status::kOk) {
+  if (!done && brake(draft_.start, draft_.takes_over, stop) == Status::kOk) {
     const stages::FencedView fenced(map_.view(), config_.fence);
     // Where what is flown touches a body sooner than the stop leaves free space, it is better than that.
     const double free_s = free_until_s(stages::FinestView(fenced), stop, 0.0, config_.vehicle.radius_m,

@@ -45,6 +45,7 @@ struct FlightConfig {
   /// Pixels a side of the images that each LiDAR's cloud becomes; 0: there is no such LiDAR.
   std::array<std::uint16_t, kMostLidars> cloud_pixels{};
   governor::Design design{governor::Design::kAware};
+  governor::Aim aim{governor::Aim::kTime};  ///< Of the design aware: the static ones have their speed.
   core::CostProfile costs{};  ///< What the stages without knobs cost: their constant is planned for.
   governor::KnobArray<governor::LatencyModel> model{};  ///< Map, export, planner.
   std::uint64_t seed{1};                                ///< Of the planner's random numbers.

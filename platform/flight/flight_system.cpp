@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/energy_model.hpp"
 #include "core/range.hpp"
 #include "firmware_if/assert.hpp"
 
@@ -89,6 +90,7 @@ governor::GovernorConfig governor_config(const FlightConfig& config) noexcept {
   g.governor_s = config.design == governor::Design::kAware ? cost_of(core::StageId::kGovernor) : 0.0;
   g.smoother_s = cost_of(core::StageId::kSmoother);
   g.v_max_mps = config.vehicle.speed_mps;
+  if (config.aim == governor::Aim::kEnergy) g.cheapest_mps = cheapest_speed_mps(config.vehicle);
   g.vehicle_width_m = 2.0 * config.vehicle.radius_m;
   g.stopping = stopping_model(config.vehicle);
   const double range_m = config.camera_range_m;

@@ -4,7 +4,7 @@ namespace roborun::flight {
 
 std::optional<Vector3> surface_middle_W(const Vector3& place_W,
                                         std::span<const stages::CloudPoint> points) noexcept {
-  constexpr double kBody_m = 0.9, kApart_m = 1.6;
+  constexpr double kApart_m = 1.6;
   constexpr int kLeast = 3;
   constexpr int kAround = 4;  // of a body's points one may lie around it
   Vector3 middle_W = place_W;
@@ -15,7 +15,7 @@ std::optional<Vector3> surface_middle_W(const Vector3& place_W,
     for (const stages::CloudPoint& point : points) {
       const double squared_m2 = (point.p_W - middle_W).squaredNorm();
       if (squared_m2 > kApart_m * kApart_m) continue;
-      if (squared_m2 > kBody_m * kBody_m) {
+      if (squared_m2 > kBodyReach_m * kBodyReach_m) {
         ++around;
         continue;
       }

@@ -110,6 +110,7 @@ std::string decision_json(const DecisionEntry& e) {
   j.number("x_m", e.p_WB[0]).number("y_m", e.p_WB[1]).number("z_m", e.p_WB[2]);
   j.number("goal_x_m", e.goal_W[0]).number("goal_y_m", e.goal_W[1]).number("goal_z_m", e.goal_W[2]);
   j.number("speed_mps", e.speed_mps).number("speed_limit_mps", e.speed_limit_mps);
+  j.text("speed_source", e.speed_source);
   j.number("p0_m", e.p0_m).number("p1_m", e.p1_m);
   j.number("v0_m3", e.v0_m3, 1).number("v1_m3", e.v1_m3, 1).number("v2_m3", e.v2_m3, 1);
   j.number("time_budget_s", e.time_budget_s).text("budget_source", e.budget_source);

@@ -64,6 +64,7 @@ struct DecisionEntry {
   double time_budget_s{}, deadline_s{}, latency_s{};
   const char* kind{""};
   const char* budget_source{""};
+  const char* speed_source{""};
   std::array<double, core::kStageCount> stage_s{}, predicted_s{};
   double visible_m{}, closest_obstacle_m{}, gap_average_m{}, sensor_volume_m3{}, map_volume_m3{}, demand_m{};
   double way_m{};

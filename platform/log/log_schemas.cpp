@@ -137,8 +137,8 @@ std::string decision_schema() {
   return object_schema(
       "roborun.Decision",
       all_of(numbers, "number") + "," +
-          all_of("kind budget_source solver active ways planner smoother refused", "string") + "," +
-          joined({{"missed", R"({"type":"boolean"})"}, {"why", array_of(std::string(kText))}}));
+          all_of("kind budget_source speed_source solver active ways planner smoother refused", "string") +
+          "," + joined({{"missed", R"({"type":"boolean"})"}, {"why", array_of(std::string(kText))}}));
 }
 
 std::string failsafe_schema() {

@@ -20,6 +20,17 @@ std::string words_of_source(std::string_view source) {
   return std::string(source);
 }
 
+std::string words_of_speed(std::string_view source) {
+  if (source == "file") return "the vehicle file: its fastest flight";
+  if (source == "energy") return "--aim energy: faster, a metre would cost more";
+  if (source == "goal") return "the goal, which is near";
+  if (source == "motion") return "something that moves nearby";
+  if (source == "thin") return "something thin nearby: it must be seen in time";
+  if (source == "fixed") return "the static design: its speed never changes";
+  if (source == "policy") return "the step of the mission, or a policy of your own";
+  return std::string(source);
+}
+
 /// Calls `f` with each part of a text with + between.
 template <typename F>
 void each_part(std::string_view text, F&& f) {
@@ -89,7 +100,8 @@ std::vector<std::string> why_of(const DecisionEntry& e) {
       "{:.0f}, planned {:.0f} m3.",
       e.p0_m, e.p1_m, metres(e.demand_m), e.v0_m3, e.v1_m3, e.v2_m3));
   lines.push_back("Which way     " + words_of_ways(e));
-  lines.push_back(fmt::format("How fast      the next trajectory may fly {:.1f} m/s.", e.speed_limit_mps));
+  lines.push_back(fmt::format("How fast      the next trajectory may fly {:.1f} m/s. Set by {}.",
+                              e.speed_limit_mps, words_of_speed(e.speed_source)));
   return lines;
 }
 

@@ -111,6 +111,7 @@ log::DecisionEntry decision_entry(flight::FlightSystem& system, const flight::De
   e.latency_s = seconds(out.latency);
   e.kind = name_of(out.kind);
   e.budget_source = governor::to_string(out.decision.source);
+  e.speed_source = governor::to_string(out.decision.speed_source);
   for (std::size_t i = 0; i < core::kStageCount; ++i) {
     e.stage_s[i] = seconds(out.cost[i]);
     e.predicted_s[i] = out.decision.predicted_s[i];

@@ -379,6 +379,8 @@ Json StoryTeller::facts() const {
   add("fastest", number("max_velocity_mps", " m/s"));
   add("mean", number("mean_velocity_mps", " m/s"));
   add("energy", number("energy_kJ", " kJ"));
+  add("flight", number("flight_Jpm", " J/m"));
+  add("computing", number("computing_Jpm", " J/m"));
   add("decisions", count("decisions"));
   add("deadlines missed", count("deadline_misses"));
   return facts;

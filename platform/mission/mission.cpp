@@ -101,6 +101,7 @@ report::DecisionRecord record_of(const log::DecisionEntry& e) {
   r.v2_m3 = e.v2_m3;
   r.time_budget_s = e.time_budget_s;
   r.budget_source = e.budget_source;
+  r.speed_source = e.speed_source;
   r.deadline_s = e.deadline_s;
   r.latency_s = e.latency_s;
   r.stage_s = e.stage_s;
@@ -426,7 +427,11 @@ void MissionRun::summarise(double wall_s) {
   r.ways = config_.own.ways ? kCustom : config_.backends.ways;
   r.mission_time_s = seconds(flight_.now().time_since_epoch());
   r.mean_velocity_mps = r.mission_time_s > 0.0 ? r.distance_m / r.mission_time_s : 0.0;
-  r.energy_kJ = 1e-3 * aircraft_.vehicle().state().energy_J;
+  const double energy_J = aircraft_.vehicle().state().energy_J;
+  const double computing_J = config_.flight.vehicle.avionics_W * r.mission_time_s;
+  r.energy_kJ = 1e-3 * energy_J;
+  r.flight_Jpm = (energy_J - computing_J) / r.distance_m;
+  r.computing_Jpm = computing_J / r.distance_m;
   r.decisions = report_.decisions.size();
   std::vector<double> precision_m;
   for (const report::DecisionRecord& d : report_.decisions) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/energy_model.hpp"
 #include "platform/flight/failsafe_monitor.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/sitl/sensors/lidar.hpp"
@@ -18,6 +19,18 @@ governor::Design design_of(const char* option, const std::string& name) {
   throw InputError(fmt::format(
       "{}: unknown design '{}': must be aware, static, static-fair, or several with commas between", option,
       name));
+}
+
+std::optional<governor::Aim> aim_named(const std::string& name) {
+  for (const auto aim : {governor::Aim::kTime, governor::Aim::kEnergy})
+    if (name == governor::to_string(aim)) return aim;
+  return std::nullopt;
+}
+
+governor::Aim aim_of(const char* option, const std::string& name) {
+  const auto aim = aim_named(name);
+  if (!aim) throw InputError(fmt::format("{}: unknown aim '{}': must be time or energy", option, name));
+  return *aim;
 }
 
 flight::FlightConfig flight_config_in(const FlightSpace& space, const MissionConfig& config) {
@@ -95,7 +108,7 @@ std::vector<std::string> beyond_reach(const sitl::World& world, const MissionCon
   for (const Vector3& goal_W : goals_W) {
     way_m += (goal_W - last_W).norm();
     last_W = goal_W;
-    const double needed_J = way_m / vehicle.speed_mps * sitl::hover_power_W(vehicle);
+    const double needed_J = way_m / vehicle.speed_mps * hover_power_W(vehicle);
     if (needed_J > usable_J)
       lines.push_back(
           fmt::format("goal ({:.2f}, {:.2f}, {:.2f}): beyond the battery's reach: {:.0f} m take {:.0f} kJ at "

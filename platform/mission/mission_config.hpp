@@ -113,6 +113,10 @@ void set_vehicle(MissionConfig& config, const vehicle::Vehicle& vehicle);
 [[nodiscard]] std::vector<std::string> beyond_reach(const sitl::World& world, const MissionConfig& config);
 /// Of the images that the map will get.
 [[nodiscard]] board::ImageLimits image_limits(const MissionConfig& config);
+/// "time" or "energy"; anything else: none.
+[[nodiscard]] std::optional<governor::Aim> aim_named(const std::string& name);
+/// The same. Throws InputError that names the option.
+[[nodiscard]] governor::Aim aim_of(const char* option, const std::string& name);
 /// "aware", "static" or "static-fair". Throws InputError that names the option.
 [[nodiscard]] governor::Design design_of(const char* option, const std::string& name);
 

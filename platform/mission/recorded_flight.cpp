@@ -171,6 +171,7 @@ std::string to_json(const RecordedFlight& recorded) {
   j["goal_W"] = vector_json(flight.goal_W);
   j["cruise_m"] = flight.cruise_m;
   j["design"] = governor::to_string(flight.design);
+  if (flight.aim != governor::Aim::kTime) j["aim"] = governor::to_string(flight.aim);
   j["seed"] = flight.seed;
   j["map"] = recorded.backends.map;
   j["planner"] = recorded.backends.planner;
@@ -224,6 +225,7 @@ RecordedFlight recorded_flight_from(std::string_view json) {
   flight.goal_W = place(j, "goal_W");
   flight.cruise_m = number(j, "cruise_m", -kFarthest_m, kFarthest_m);
   flight.design = design_of("design", j.at("design").get<std::string>());
+  flight.aim = aim_of("aim", j.value("aim", governor::to_string(governor::Aim::kTime)));
   flight.seed = j.at("seed").get<std::uint64_t>();
   recorded.backends = {j.at("map").get<std::string>(), j.at("planner").get<std::string>()};
   // A file that came from elsewhere does not choose what code is loaded.

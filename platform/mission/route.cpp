@@ -51,8 +51,7 @@ void check_route(const Route& route, const Aabb& bounds_W, const core::Fence& fe
 governor::Decision SpeedCap::decide(const SpaceProfile& profile,
                                     const governor::Situation& situation) noexcept {
   governor::Decision decision = governor_.decide(profile, situation);
-  decision.point.speed_limit_mps =
-      std::min(decision.point.speed_limit_mps, cap_mps_.load(std::memory_order_relaxed));
+  decision.cap_speed(cap_mps_.load(std::memory_order_relaxed));
   return decision;
 }
 

@@ -87,15 +87,16 @@ constexpr std::array<SettingKey, 17> kSettings = [] {
 // clang-format on
 
 /// Keys that are no single number.
-constexpr std::array<std::pair<const char*, const char*>, 9> kOtherKeys{{{"camera", "model"},
-                                                                         {"lidar", "model"},
-                                                                         {"imu", "model"},
-                                                                         {"gnss", "model"},
-                                                                         {"odometry", "model"},
-                                                                         {"wind", "mean_mps"},
-                                                                         {"fence", "altitude_m"},
-                                                                         {"fence", "keep_in"},
-                                                                         {"fence", "keep_out"}}};
+constexpr std::array<std::pair<const char*, const char*>, 10> kOtherKeys{{{"camera", "model"},
+                                                                          {"lidar", "model"},
+                                                                          {"imu", "model"},
+                                                                          {"gnss", "model"},
+                                                                          {"odometry", "model"},
+                                                                          {"wind", "mean_mps"},
+                                                                          {"flight", "aim"},
+                                                                          {"fence", "altitude_m"},
+                                                                          {"fence", "keep_in"},
+                                                                          {"fence", "keep_out"}}};
 
 std::set<std::string_view> keys_of(std::string_view table) {
   std::set<std::string_view> keys;
@@ -240,6 +241,13 @@ void read_settings(const input::TomlReader& reader, const toml::table& root, Mis
       config.simulator.wind.mean_W_mps = reader.point(*mean, "mean_mps");
       if (config.simulator.wind.mean_W_mps.norm() > 20.0)
         reader.refuse(*mean, "mean_mps", "must be at most 20 m/s");
+    }
+  }
+  if (const toml::table* t = section(reader, root, "flight", keys_of("flight"))) {
+    if (const toml::node* aim = t->get("aim")) {
+      const auto known = aim_named(aim->value<std::string>().value_or(""));
+      if (!known) reader.refuse(*aim, "aim", "must be \"time\" or \"energy\"");
+      config.flight.aim = *known;
     }
   }
   if (const toml::table* t = section(reader, root, "fence", keys_of("fence"))) {

@@ -12,7 +12,7 @@
 
 namespace roborun::mission {
 
-/// The numbers of settings_keys(); [camera], [lidar], [imu], [gnss] and [odometry] model = NAME (core/sensor_model.hpp), for all of the vehicle; [wind] mean_mps = [x, y, z]; [fence] altitude_m = [low, high], keep_in and keep_out, arrays of { polygon = [[x, y], ...] } or { circle = [x, y, radius] }. What is
+/// The numbers of settings_keys(); [camera], [lidar], [imu], [gnss] and [odometry] model = NAME (core/sensor_model.hpp), for all of the vehicle; [wind] mean_mps = [x, y, z]; [flight] aim = NAME; [fence] altitude_m = [low, high], keep_in and keep_out, arrays of { polygon = [[x, y], ...] } or { circle = [x, y, radius] }. What is
 /// not there keeps its default. Throws InputError with file, line, key and range.
 void load_settings(const std::string& path, MissionConfig& config);
 

@@ -55,7 +55,7 @@ SpeedLimits speed_limits(const flight::FlightConfig& config) {
   const auto limit_mps = [&](bool governor::Situation::*what) {
     governor::Situation there = situation;
     there.*what = true;
-    return governor.speed_limit_mps(there, shortest_s);
+    return governor.speed_limit(there, shortest_s).speed_mps;
   };
   add("slow-decisions", governor.safe_speed_mps(visible_m, longest_s),
       fmt::format("decisions take {:.1f} s", longest_s));
@@ -65,7 +65,7 @@ SpeedLimits speed_limits(const flight::FlightConfig& config) {
                     config.pixels_per_tan));
   add("motion", limit_mps(&governor::Situation::motion), "something moves nearby");
   situation.distance_to_goal_m = 0.0;
-  add("goal", governor.speed_limit_mps(situation, shortest_s),
+  add("goal", governor.speed_limit(situation, shortest_s).speed_mps,
       fmt::format("the goal is nearer than {:.0f} m", g.policy.near_goal_m));
   return r;
 }

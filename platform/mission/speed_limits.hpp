@@ -25,7 +25,7 @@ struct SpeedLimits {
 /// All of them, of the design aware. They come from the functions that the flight calls: the governor's upper bound, its safe
 /// speed for the stop that trajectories are planned with inside what the sensors see, its limit in each situation, and the level
 /// flight that a vehicle is refused beyond. A plan may still be slower: around obstacles, through what is not seen yet, and where decisions
-/// take longer. Precondition: config.validate() is kOk, and sensors are described (flight::describe_sensors).
+/// take longer. Precondition: config.validate() is kOk, it aims at time, and sensors are described (flight::describe_sensors).
 [[nodiscard]] SpeedLimits speed_limits(const flight::FlightConfig& config);
 
 }  // namespace roborun::mission

@@ -39,6 +39,8 @@ std::string to_json(const MissionResult& r) {
   json["mission"] = r.mission;
   json["reason"] = r.reason;
   json["speed_limit_mps"] = r.speed_limit_mps;
+  json["flight_Jpm"] = r.flight_Jpm;
+  json["computing_Jpm"] = r.computing_Jpm;
   if (r.route)
     json["mission"] = {{"steps", r.route->steps}, {"done", r.route->done}, {"released", r.route->released}};
   for (const GoalRecord& g : r.goals)

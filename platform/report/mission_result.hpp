@@ -69,7 +69,10 @@ struct MissionResult {
   std::string mission;
   std::string reason;        ///< Why the mission ended.
   double speed_limit_mps{};  ///< v_max of the design.
-  bool believed{true};       ///< False: a plugin took more time than the work that it counted is worth.
+  double
+      flight_Jpm{};  ///< Of energy_kJ, what the rotors took, per metre of distance_m; +infinity without one.
+  double computing_Jpm{};  ///< The rest: computer, sensors, autopilot (power.avionics_W), per metre.
+  bool believed{true};     ///< False: a plugin took more time than the work that it counted is worth.
   /// Of a plan; another key, or none.
   struct RouteRecord {
     std::size_t steps{}, done{};
@@ -95,6 +98,7 @@ struct DecisionRecord {
   double v2_m3{};
   double time_budget_s{};
   std::string budget_source;
+  std::string speed_source;
   double deadline_s{};
   double latency_s{};
   std::array<double, core::kStageCount> stage_s{};  ///< Spent.

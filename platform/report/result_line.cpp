@@ -37,6 +37,8 @@ std::optional<MissionResult> from_line(const std::string& line) {
     r.mean_velocity_mps = number(json.at("mean_velocity_mps"));
     r.max_velocity_mps = number(json.at("max_velocity_mps"));
     r.energy_kJ = number(json.at("energy_kJ"));
+    r.flight_Jpm = number(json.value("flight_Jpm", Json()));  // results of before have none
+    r.computing_Jpm = number(json.value("computing_Jpm", Json()));
     r.decisions = json.at("decisions");
     r.deadline_misses = json.at("deadline_misses");
     const Json& latency = json.at("latency_s");

@@ -31,6 +31,9 @@ double cpu_per_decision(const MissionResult& r) {
   return r.decisions > 0 ? r.cpu_s / static_cast<double>(r.decisions) : kNaN;
 }
 
+double flight_per_metre(const MissionResult& r) { return r.flight_Jpm; }
+double computing_per_metre(const MissionResult& r) { return r.computing_Jpm; }
+
 double median(std::vector<double> values) {
   if (values.empty()) return kNaN;
   std::sort(values.begin(), values.end());
@@ -163,6 +166,8 @@ std::vector<DesignSummary> summarise(const std::vector<SweepRow>& rows) {
     s.velocity_mps = estimate(mine, velocity);
     s.mission_time_s = estimate(mine, mission_time);
     s.energy_kJ = estimate(mine, energy);
+    s.flight_Jpm = estimate(mine, flight_per_metre);
+    s.computing_Jpm = estimate(mine, computing_per_metre);
     s.latency_s = estimate(mine, latency);
     s.latency_s.mean = median(latencies_s);
     s.cpu_s_per_decision = estimate(mine, cpu_per_decision);
@@ -213,16 +218,17 @@ Gain gain(const std::vector<SweepRow>& rows, const std::string& profile, const s
 
 std::string sweep_table(const std::vector<SweepRow>& rows) {
   const std::vector<DesignSummary> summaries = summarise(rows);
+  constexpr const char* kRow =
+      "{:<12} {:<8} {:>8} {:>7} {:>8} {:>13} {:>15} {:>13} {:>13} {:>9} {:>9} {:>9}\n";
   std::string text =
-      fmt::format("{:<12} {:<8} {:>8} {:>7} {:>8} {:>13} {:>15} {:>13} {:>9} {:>9}\n", "design", "profile",
-                  "missions", "reached", "collided", "mean m/s", "time s", "kJ", "latency s", "CPU s per");
-  text += fmt::format("{:<12} {:<8} {:>8} {:>7} {:>8} {:>13} {:>15} {:>13} {:>9} {:>9}\n", "", "", "", "", "",
-                      "", "", "", "median", "decision");
+      fmt::format(fmt::runtime(kRow), "design", "profile", "missions", "reached", "collided", "mean m/s",
+                  "time s", "kJ", "flight J/m", "comp. J/m", "latency s", "CPU s per");
+  text += fmt::format(fmt::runtime(kRow), "", "", "", "", "", "", "", "", "", "", "median", "decision");
   for (const DesignSummary& s : summaries) {
-    text +=
-        fmt::format("{:<12} {:<8} {:>8} {:>7} {:>8} {:>13} {:>15} {:>13} {:>9} {:>9}\n", s.design, s.profile,
-                    s.missions, s.reached, s.collided, shown(s.velocity_mps, 2), shown(s.mission_time_s, 0),
-                    shown(s.energy_kJ, 0), shown(s.latency_s.mean, 2), shown(s.cpu_s_per_decision, 2));
+    text += fmt::format(fmt::runtime(kRow), s.design, s.profile, s.missions, s.reached, s.collided,
+                        shown(s.velocity_mps, 2), shown(s.mission_time_s, 0), shown(s.energy_kJ, 0),
+                        shown(s.flight_Jpm, 1), shown(s.computing_Jpm.mean, 1), shown(s.latency_s.mean, 2),
+                        shown(s.cpu_s_per_decision, 2));
     if (const auto p = published(s.design)) {
       text += fmt::format("{:<12} {:<8} {:>8} {:>7} {:>8} {:>13} {:>15} {:>13}\n", "  published", "", 27, "",
                           "", shown(p->velocity_mps, 1), shown(p->mission_time_s, 0), shown(p->energy_kJ, 0));
@@ -266,6 +272,8 @@ std::string sweep_json(const std::string& suite, const std::vector<SweepRow>& ro
     json["mean_velocity_mps"] = s.velocity_mps.mean;
     json["mean_mission_time_s"] = s.mission_time_s.mean;
     json["mean_energy_kJ"] = s.energy_kJ.mean;
+    json["mean_flight_Jpm"] = s.flight_Jpm.mean;
+    json["mean_computing_Jpm"] = s.computing_Jpm.mean;
     json["median_latency_s"] = s.latency_s.mean;
     json["cpu_s_per_decision"] = s.cpu_s_per_decision.mean;
     json["half_95"] = {{"mean_velocity_mps", s.velocity_mps.half_95},

@@ -39,6 +39,7 @@ struct DesignSummary {
   Estimate velocity_mps;
   Estimate mission_time_s;
   Estimate energy_kJ;
+  Estimate flight_Jpm, computing_Jpm;
   Estimate latency_s;  ///< Of the missions' medians; its mean is their median, as published.
   Estimate cpu_s_per_decision;
 };

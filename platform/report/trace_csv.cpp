@@ -6,7 +6,8 @@ namespace roborun::report {
 
 std::string trace_csv(std::span<const MissionReport> missions) {
   std::string text =
-      "design,seed,time_s,x_m,y_m,z_m,speed_mps,speed_limit_mps,p0_m,p1_m,v0_m3,v1_m3,v2_m3,time_budget_s,"
+      "design,seed,time_s,x_m,y_m,z_m,speed_mps,speed_limit_mps,speed_source,p0_m,p1_m,v0_m3,v1_m3,v2_m3,"
+      "time_budget_s,"
       "budget_source,"
       "deadline_s,latency_s";
   for (std::size_t i = 0; i < core::kStageCount; ++i)
@@ -17,11 +18,11 @@ std::string trace_csv(std::span<const MissionReport> missions) {
   for (const MissionReport& mission : missions) {
     for (const DecisionRecord& d : mission.decisions) {
       text += fmt::format(
-          "{},{},{:.4f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{},{},{:.1f},{:.1f},{:.1f},{:.4f},{},{:.4f},{:."
+          "{},{},{:.4f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{},{},{},{:.1f},{:.1f},{:.1f},{:.4f},{},{:.4f},{:."
           "6f}",
           mission.result.design, mission.result.seed, d.time_s, d.p_WB.x(), d.p_WB.y(), d.p_WB.z(),
-          d.speed_mps, d.speed_limit_mps, d.p0_m, d.p1_m, d.v0_m3, d.v1_m3, d.v2_m3, d.time_budget_s,
-          d.budget_source, d.deadline_s, d.latency_s);
+          d.speed_mps, d.speed_limit_mps, d.speed_source, d.p0_m, d.p1_m, d.v0_m3, d.v1_m3, d.v2_m3,
+          d.time_budget_s, d.budget_source, d.deadline_s, d.latency_s);
       for (std::size_t i = 0; i < core::kStageCount; ++i)
         text += fmt::format(",{:.6f},{:.6f}", d.stage_s[i], d.predicted_s[i]);
       text += fmt::format(",{:.2f},{:.2f},{:.2f},{:.0f},{:.0f},{:.3f},{},{},{},{:.1f},{},{},{},{}\n",

@@ -33,6 +33,7 @@ TEST(GovernorConfigDeathTest, OnlyValidOnesAreMade) {
        {"model", [](Config& c) { c.model[Knob::kPlan].slope_s_per_m3[2] = kNan; }},
        {"fixed cost", [](Config& c) { c.smoother_s = -0.01; }},
        {"speed", [](Config& c) { c.v_max_mps = 0.0; }},
+       {"cheapest speed", [](Config& c) { c.cheapest_mps = 0.0; }},
        {"width", [](Config& c) { c.vehicle_width_m = 0.0; }},
        {"view", [](Config& c) { c.sensor_volume_max_m3 = kNan; }},
        {"level", [](Config& c) { c.coarsest_level = kPrecisionLevels; }},

@@ -138,6 +138,39 @@ TEST(Governor, AmongThinThingsSpeedFollowsTheTimeBetweenTwoLooks) {
   EXPECT_EQ(Governor(config).decide(p, situation).point.speed_limit_mps, 0.5) << "the published design";
 }
 
+TEST(Governor, FliesNoFasterThanWhatSpendsLeastAndSaysWhatSetsItsSpeed) {
+  GovernorConfig config = paper_config(Design::kAware);
+  const SpaceProfile p = open_space(20.0, 2.0);
+  Situation situation{0, 100.0};
+  const auto decided = [&] { return Governor(config).decide(p, situation); };
+  const auto expect = [&](double speed_mps, SpeedSource source) {
+    const Decision d = decided();
+    EXPECT_EQ(d.point.speed_limit_mps, speed_mps);
+    EXPECT_STREQ(to_string(d.speed_source), to_string(source));
+  };
+  expect(config.v_max_mps, SpeedSource::kFile);
+  config.cheapest_mps = config.v_max_mps + 0.5;
+  expect(config.v_max_mps, SpeedSource::kFile);
+  config.cheapest_mps = 3.5;
+  expect(3.5, SpeedSource::kEnergy);
+  EXPECT_EQ(Governor(config).v_max_mps(), 3.5);
+  situation.distance_to_goal_m = 1.0;
+  expect(config.policy.near_goal_speed_mps, SpeedSource::kGoal);
+  situation.motion = true;
+  expect(config.policy.motion_speed_mps, SpeedSource::kMotion);
+  situation.thin = true;
+  config.thin_step_m = 1e-3;
+  expect(config.policy.thin_speed_mps, SpeedSource::kThin);
+  Decision d = decided();
+  d.cap_speed(5.0);
+  EXPECT_EQ(d.speed_source, SpeedSource::kThin) << "no cap of what is slower";
+  d.cap_speed(0.25);
+  EXPECT_EQ(d.point.speed_limit_mps, 0.25);
+  EXPECT_EQ(d.speed_source, SpeedSource::kPolicy);
+  config.design = Design::kStatic;
+  expect(0.5, SpeedSource::kFixed);
+}
+
 TEST(Governor, TimeWinsOverPrecisionAtSpeed) {
   Governor sut(paper_config(Design::kAware));
   SpaceProfile p = open_space(8.0, 6.0);

@@ -1,6 +1,5 @@
 /// A decision policy of your own, flown by the shipped simulator: slower the nearer something stands. Links
 /// roborun::mission; in your own program it is FlightParts::policy.
-#include <algorithm>
 #include <memory>
 
 #include "fly.hpp"
@@ -22,7 +21,7 @@ class ShyPolicy final : public roborun::governor::DecisionPolicy {
     // Half a metre per second for each metre of room, from walking pace on. Without an obstacle in view the
     // distance is infinite; the comparison is written so that NaN counts as no room.
     const double room_m = profile.closest_obstacle_m > 2.0 ? profile.closest_obstacle_m : 2.0;
-    decision.point.speed_limit_mps = std::min(decision.point.speed_limit_mps, 0.5 * room_m);
+    decision.cap_speed(0.5 * room_m);
     return decision;
   }
   void observe(roborun::core::StageId id, double predicted_s, double spent_s) noexcept override {

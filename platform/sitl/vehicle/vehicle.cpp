@@ -2,31 +2,16 @@
 
 #include <cmath>
 
+#include "core/energy_model.hpp"
 #include "core/geometry/math.hpp"
 
 namespace roborun::sitl {
 namespace {
 
-constexpr double kAirDensity_kgpm3 = 1.225;
 constexpr double kMaxSubstep_s = 1.25e-3;
 constexpr double kLegs_mps2 = 30.0;
 
-/// Of one motor.
-double electrical_power_W(const VehicleModel& model, double thrust_N, double axial_mps) noexcept {
-  // Rotor momentum theory: induced velocity in axial flight; descent never gives power back.
-  const double area_m2 = core::kPi * model.rotor_radius_m * model.rotor_radius_m;
-  const double half_mps = 0.5 * std::fmax(axial_mps, 0.0);
-  const double induced_mps =
-      -half_mps + std::sqrt(half_mps * half_mps + thrust_N / (2.0 * kAirDensity_kgpm3 * area_m2));
-  return thrust_N * (induced_mps + std::fmax(axial_mps, 0.0)) / model.efficiency_ratio;
-}
-
 }  // namespace
-
-double hover_power_W(const VehicleModel& model) noexcept {
-  const double thrust_N = 0.25 * model.mass_kg * core::kGravity_mps2;
-  return model.avionics_W + 4.0 * electrical_power_W(model, thrust_N, 0.0);
-}
 
 Vehicle::Vehicle(const VehicleModel& model, const WindConfig& wind, const Vector3& p_WB,
                  std::uint64_t seed) noexcept
@@ -107,7 +92,7 @@ void Vehicle::substep(double dt_s) noexcept {
 
   const double axial_mps = R_WB.col(2).dot(air_W_mps);
   s.power_W = model_.avionics_W;
-  for (const double t_N : thrust_N) s.power_W += electrical_power_W(model_, t_N, axial_mps);
+  for (const double t_N : thrust_N) s.power_W += rotor_power_W(model_, t_N, axial_mps);
   s.energy_J += s.power_W * dt_s;
   s.battery_ratio = std::fmax(0.0, 1.0 - s.energy_J / model_.battery_J);
 }

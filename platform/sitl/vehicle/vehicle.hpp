@@ -32,9 +32,6 @@ struct VehicleState {
   bool on_ground{true};
 };
 
-/// What it takes from its battery while it hovers.
-[[nodiscard]] double hover_power_W(const VehicleModel& model) noexcept;
-
 /// Deterministic: own random numbers, no libm. One minor frame costs well under 2 us.
 class Vehicle final : public firmware_if::Motors {
  public:

@@ -25,6 +25,10 @@ refuses "aware, static, static-fair" fly --design aware,,static
 refuses "aware, static, static-fair" fly --design aware,
 refuses "aware, static, static-fair" fly --design ""
 refuses "paper, host, cortex-a72, or a file" fly --profile x
+for command in "fly" "sweep --out /tmp/roborun_cli_test_sweep.$$" "run --link port:x --goal 9,0,5"; do
+  # shellcheck disable=SC2086  # words of a command
+  refuses "--aim: unknown aim 'money': must be time or energy" $command --aim money
+done
 refuses "cannot be opened" explain nope.csv --at 3
 refuses "no column" explain "$data/worlds/two_pillars.toml" --at 3
 refuses "cannot be written" fly --trace /nonexistent/x.csv
@@ -192,6 +196,15 @@ if [[ $(wc -l <<<"$names") -ge 15 && -z $(uniq -d <<<"$names") && $pools != *nul
   passed=$((passed + 1))
 else
   echo "FAILED memory --fly 20 names a pool twice or has no high-water mark: $pools"
+  failed=$((failed + 1))
+fi
+# The speed that spends least per metre, and that it is less than the top speed of a racer.
+if [[ $("$roborun" vehicle check racer) == *"the least: --aim energy flies no faster"* &&
+      $("$roborun" vehicle check paper) == *"the least: --aim energy changes nothing"* &&
+      $("$roborun" vehicle check paper --json) == *'"least_energy":{"speed_mps":13.6'* ]]; then
+  passed=$((passed + 1))
+else
+  echo "FAILED vehicle check does not say at what speed a metre costs least"
   failed=$((failed + 1))
 fi
 # Goals are flown one after the other, each with its answer, and the mission ends at the last.

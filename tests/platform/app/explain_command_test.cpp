@@ -39,6 +39,7 @@ TEST(Explain, NamesTheDecisionInForceAndEverythingThatSetIt) {
   const std::string text = explain_decision("t.csv", trace(), 7.9, "");
   EXPECT_NE(text.find("Decision 8 of aware, at 7.00 s"), std::string::npos) << text;
   EXPECT_NE(text.find("the trajectory being flown"), std::string::npos);
+  EXPECT_NE(text.find("Set by the vehicle file: its fastest flight."), std::string::npos) << text;
   EXPECT_NE(text.find("0.1250"), std::string::npos) << "predicted time of the map";
   EXPECT_NE(text.find("all the time is used"), std::string::npos);
   EXPECT_NE(text.find("nearest obstacle"), std::string::npos);

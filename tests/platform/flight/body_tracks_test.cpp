@@ -104,6 +104,18 @@ TEST(BodyTracks, WhatPartsDoesNotMeet) {
             BodyTracks::kNever);
 }
 
+// Whatever leads out of a touch is as good as keeping off.
+TEST(BodyTracks, WhatTouchesAlreadyIsMetOnlyIfItComesNearerStill) {
+  const BodyTracks sut =
+      crossing_until(2.0);  // at (10, -6), seen from the left: its middle is a little farther
+  const auto meeting = [&](double y_m) {
+    return sut.meets(Trajectory::hold({10.2, y_m, 3}, at_s(0.0)), at_s(2.0), kPlanned_m, kOwn_m);
+  };
+  EXPECT_NEAR(meeting(-5.5).touch_s, 0.1, 1e-9) << "ahead of it";
+  EXPECT_EQ(meeting(-6.8).touch_s, BodyTracks::kNever) << "behind it";
+  EXPECT_EQ(meeting(-6.8).near_s, BodyTracks::kNever);
+}
+
 TEST(BodyTracks, BoundsGrowWithTimeUnseenAndTracksEnd) {
   const BodyTracks sut = crossing_until(2.0);
   // At rest 2.2 m beside its way: far enough now, not after a while without a look.

@@ -64,6 +64,7 @@ inline log::DecisionEntry sample_decision(std::uint64_t number, double time_s, d
   e.latency_s = 0.2 + 0.15 * wave;
   e.kind = "new";
   e.budget_source = "trajectory";
+  e.speed_source = "file";
   for (double& s : e.stage_s) s = e.latency_s / static_cast<double>(e.stage_s.size());
   e.predicted_s = e.stage_s;
   e.visible_m = 12.0 + wave;

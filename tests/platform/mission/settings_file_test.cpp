@@ -31,6 +31,7 @@ TEST(Settings, RefusesWithFileLineKeyAndRange) {
       {"[engine]\n", "engine: unknown key in the file"},
       {"camera = 3\n", ":1: camera: must be a table"},
       {"[flight]\nv_max_mps = nan\n", ":2: v_max_mps: must be a number"},
+      {"[flight]\naim = \"money\"\n", ":2: aim: must be \"time\" or \"energy\""},
   };
   for (const auto& [text, says] : cases) {
     MissionConfig config;
@@ -41,6 +42,13 @@ TEST(Settings, RefusesWithFileLineKeyAndRange) {
       EXPECT_NE(std::string(error.what()).find(says), std::string::npos) << error.what();
     }
   }
+}
+
+TEST(Settings, SayWhatTheFlightIsToSave) {
+  MissionConfig config;
+  EXPECT_EQ(config.flight.aim, governor::Aim::kTime);
+  load_settings(test::scratch_file("aim.toml", "[flight]\naim = \"energy\"\n"), config);
+  EXPECT_EQ(config.flight.aim, governor::Aim::kEnergy);
 }
 
 TEST(Settings, ModelsGoForAllSensorsOfAKind) {

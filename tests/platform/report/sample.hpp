@@ -19,6 +19,8 @@ inline report::MissionReport sample_mission(const std::string& design, double sp
   m.result.distance_m = 900.0;
   m.result.mean_velocity_mps = speed_mps;
   m.result.energy_kJ = 0.5 * m.result.mission_time_s;
+  m.result.flight_Jpm = 485.0 / speed_mps;
+  m.result.computing_Jpm = 15.0 / speed_mps;
   for (int i = 0; i < 20; ++i) {
     report::DecisionRecord d;
     d.time_s = i;
@@ -26,6 +28,7 @@ inline report::MissionReport sample_mission(const std::string& design, double sp
     d.speed_mps = speed_mps;
     d.p0_m = 0.3;
     d.budget_source = "trajectory";
+    d.speed_source = "file";
     d.ways_status = "ok";
     d.way_m = 45.0 * (20 - i);
     d.planner_status = "ok";

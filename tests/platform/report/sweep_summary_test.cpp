@@ -41,6 +41,8 @@ TEST(ResultLine, ReadsBackWhatItWroteWithoutTheWallTime) {
   EXPECT_EQ(to_line(*back), line);
   EXPECT_EQ(back->seed, result.seed);
   EXPECT_EQ(back->energy_kJ, result.energy_kJ);
+  EXPECT_EQ(back->flight_Jpm, result.flight_Jpm);
+  EXPECT_EQ(back->computing_Jpm, result.computing_Jpm);
   EXPECT_TRUE(std::isnan(back->cpu_s));
   for (std::size_t cut = 0; cut < line.size(); ++cut) EXPECT_FALSE(from_line(line.substr(0, cut)));
 }
@@ -129,6 +131,9 @@ TEST(SweepSummary, TheTableNamesEachMissionThatFailedAndTheJsonHasTheAgreedField
   EXPECT_EQ(aware.at("mean_velocity_mps"), 4.0);
   EXPECT_EQ(aware.at("mean_mission_time_s"), 225.0);
   EXPECT_EQ(aware.at("mean_energy_kJ"), 112.5);
+  EXPECT_EQ(aware.at("mean_flight_Jpm"), 121.25);
+  EXPECT_EQ(aware.at("mean_computing_Jpm"), 3.75);
+  EXPECT_NE(table.find("        121.2       3.8"), std::string::npos) << table;
   EXPECT_EQ(aware.at("median_latency_s"), 0.5);
   EXPECT_EQ(aware.at("cpu_s_per_decision"), 0.5);
   EXPECT_EQ(json.at("profiles").at("paper"), json.at("designs"));

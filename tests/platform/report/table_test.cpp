@@ -15,6 +15,7 @@ TEST(ComparisonTable, HasARowADesignAndRatiosAgainstStatic) {
                                               test::sample_mission("static", 0.5).result};
   const std::string text = comparison_table(results);
   EXPECT_NE(text.find("8.0x v, 0.12x kJ"), std::string::npos) << text;
+  EXPECT_NE(text.find("  121.2 + 3.8 "), std::string::npos) << text;
   std::istringstream lines(text);
   std::string line;
   int rows = 0;

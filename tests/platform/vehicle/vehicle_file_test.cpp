@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/energy_model.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/vehicle/shipped_vehicles.hpp"
 
@@ -26,6 +27,20 @@ std::string refusal(const std::string& text) {
     return error.what();
   }
   return {};
+}
+
+TEST(VehicleFile, EveryShippedVehicleSpendsMoreAtEveryOtherSpeedThanItsCheapest) {
+  for (const std::string& name : shipped_vehicles()) {
+    const VehicleModel v = load_vehicle(name).model;
+    const double cheapest_mps = cheapest_speed_mps(v);
+    const double least_Jpm = energy_per_metre(v, cheapest_mps).total_Jpm();
+    EXPECT_GT(cheapest_mps, 1.0) << name;
+    EXPECT_LT(cheapest_mps, 29.0) << name;
+    for (double v_mps = 0.1; v_mps <= 30.0; v_mps += 0.1) {
+      if (std::abs(v_mps - cheapest_mps) < 0.05) continue;
+      EXPECT_GT(energy_per_metre(v, v_mps).total_Jpm(), least_Jpm) << name << " at " << v_mps;
+    }
+  }
 }
 
 TEST(VehicleFile, EveryShippedVehicleReadsAndCanFly) {

@@ -255,6 +255,68 @@ TEST_F(WayMemoryTest, EndsWithItsBudget) {
   EXPECT_EQ(sut_->look(view_, start_W_, 26.0, little, work_), Status::kBudgetSpent);
 }
 
+TEST_F(WayMemoryTest, ALookReadsNothingBeyondItsReach) {
+  make();
+  ASSERT_EQ(sut_->look(view_, start_W_, 4.0, unlimited_, work_), Status::kOk);
+  ASSERT_EQ(sut_->solve(start_W_, goal_W_, unlimited_, work_), Status::kOk);
+  const double near_m = sut_->to_goal_m(start_W_);
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  // Some 15 m more of the way are known to be free, and count once instead of twice.
+  EXPECT_GT(near_m, sut_->to_goal_m(start_W_) + 10.0);
+}
+
+TEST_F(WayMemoryTest, ALookForgetsWhatHasChangedAndKeepsTheRest) {
+  make();
+  const auto to_goal_m = [&] {
+    EXPECT_EQ(look_and_solve(start_W_), Status::kOk);
+    return sut_->to_goal_m(start_W_);
+  };
+  const double open_m = to_goal_m();
+  box(10, -20, 10.6, 20);
+  const double walled_m = to_goal_m();
+  EXPECT_GT(walled_m, open_m + 5.0);
+  EXPECT_EQ(to_goal_m(), walled_m) << "nothing changed";
+  view_.occupied.clear();
+  EXPECT_EQ(to_goal_m(), open_m);
+}
+
+/// Where more changes all the time than one look takes, the rest gets its turn.
+TEST_F(WayMemoryTest, WhatChangesAllTheTimeHidesNothingElse) {
+  class Polls final : public core::StageBudget {
+   public:
+    [[nodiscard]] bool spent(const core::Work& /*done*/) noexcept override { return ++count_ > most; }
+    int most{1 << 30}, count_{0};
+  } polls;
+  constexpr double kReach_m = 14.0;
+  const auto look = [&](int most) {
+    polls.most = most;
+    polls.count_ = 0;
+    return sut_->look(view_, start_W_, kReach_m, polls, work_);
+  };
+  const auto to_goal_m = [&] {
+    EXPECT_EQ(sut_->solve(start_W_, goal_W_, unlimited_, work_), Status::kOk);
+    return sut_->to_goal_m(start_W_);
+  };
+  make();
+  ASSERT_EQ(look(1 << 30), Status::kOk);
+  ASSERT_EQ(look(1 << 30), Status::kOk);
+  const int reading = polls.count_;  // nothing was renewed
+  const double open_m = to_goal_m();
+  constexpr int kBlocks = 4;  // of one look
+  int cut = 0;
+  for (int i = 0; i < 60; ++i) {
+    view_.occupied.clear();
+    box(5, -6, 5.6, 20);
+    if (i % 2 == 0) box(-14, -14, 14, -13);  // what comes first in the order of reading
+    cut += look(reading + kBlocks) == Status::kBudgetSpent ? 1 : 0;
+  }
+  const double walled_m = to_goal_m();
+  EXPECT_GT(cut, 40) << "more changed than fits";
+  EXPECT_GT(walled_m, open_m + 1.0);
+  ASSERT_EQ(look(1 << 30), Status::kOk);
+  EXPECT_EQ(to_goal_m(), walled_m) << "all of the wall was seen";
+}
+
 TEST_F(WayMemoryTest, DoesNotAllocate) {
   box(10, -20, 10.6, 12);
   make();
