@@ -190,7 +190,7 @@ class Range {
     // What was late comes at once when it is no longer.
     const int until = k_ - late(Sensor::kImu);
     if (lost(Sensor::kImu, k_)) imu_at_ = until;
-    for (; imu_at_ < until; ++imu_at_) hear_imu(truth_->at(static_cast<std::size_t>(imu_at_ + 1)));
+    while (imu_at_ < until) hear_imu(truth_->at(static_cast<std::size_t>(++imu_at_)));
   }
   void hear_imu(const Truth& x) {
     firmware_if::ImuSample s;
