@@ -32,14 +32,21 @@ inline void check_key_parts(const std::string& path, std::string_view text) {
   }
 }
 
+/// With what a file has of line ends and other control characters as spaces: a complaint is one line.
+[[nodiscard]] inline std::string one_line(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
+  return text;
+}
+
 /// Throws InputError with file and line if the text is not TOML.
 [[nodiscard]] inline toml::table parse_toml(const std::string& path, std::string_view text) {
   check_key_parts(path, text);
   try {
     return toml::parse(text, path);
   } catch (const toml::parse_error& error) {
-    throw InputError(
-        fmt::format("{}:{}: not valid TOML: {}", path, error.source().begin.line, error.description()));
+    throw InputError(one_line(
+        fmt::format("{}:{}: not valid TOML: {}", path, error.source().begin.line, error.description())));
   }
 }
 
@@ -49,7 +56,7 @@ class TomlReader {
   explicit TomlReader(std::string path) : path_(std::move(path)) {}
 
   [[noreturn]] void refuse(const toml::node& node, std::string_view key, std::string_view what) const {
-    throw InputError(fmt::format("{}:{}: {}: {}", path_, node.source().begin.line, key, what));
+    throw InputError(one_line(fmt::format("{}:{}: {}: {}", path_, node.source().begin.line, key, what)));
   }
   void allow_keys(const toml::table& table, std::string_view where,
                   const std::set<std::string_view>& allowed) const {

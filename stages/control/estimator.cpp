@@ -1,48 +1,30 @@
 #include "stages/control/estimator.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/geometry/math.hpp"
 #include "core/geometry/yaw.hpp"
 #include "core/range.hpp"
+#include "stages/control/estimator_terms.hpp"
 
 namespace roborun::stages {
 namespace {
 
 constexpr int kCovarianceEvery = 4;
-constexpr int kPosition = 0;
-constexpr int kVelocity = 3;
-constexpr int kAttitude = 6;
-constexpr int kGyroBias = 9;
-constexpr int kAccelBias = 12;
 constexpr double kBarometerGain = 0.01;  // at 50 Hz: over two seconds
+constexpr double kMeanForceGain = 0.05;
+constexpr double kMostAnchored_rad = 0.12;  // else the state is no place to anchor anything at
+constexpr double kMostAnchored_mps = 1.0;
 // Odometry is never trusted more: what it says wanders, and half of the corrections are still under way (its latency).
 constexpr double kLeastSigma_m = 0.02;
 constexpr double kLeastSigma_rad = 0.005;
 constexpr double kLeastSigma_mps = 0.05;
 
-Vector3 to_vector(const std::array<double, 3>& v) noexcept { return {v[0], v[1], v[2]}; }
-
-/// A standard deviation that a measurement can be weighed with.
-
 Matrix3 skew(const Vector3& v) noexcept {
   Matrix3 m;
   m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
   return m;
-}
-
-/// Rotation by a small vector, to second order, normalised.
-Quaternion small_rotation(const Vector3& angle_rad) noexcept {
-  const Vector3 half = 0.5 * angle_rad;
-  return Quaternion(1.0 - 0.5 * half.squaredNorm(), half.x(), half.y(), half.z()).normalized();
-}
-
-bool has_heading(const firmware_if::GnssFix& fix) noexcept {
-  return std::isfinite(fix.heading_rad) && fix.sigma_heading_rad > 0.0;
-}
-
-double largest_sigma_m(const firmware_if::GnssFix& fix) noexcept {
-  return std::fmax(fix.sigma_horizontal_m, fix.sigma_vertical_m);
 }
 
 }  // namespace
@@ -54,27 +36,25 @@ Status Estimator::predict(const firmware_if::ImuSample& sample) noexcept {
     ++counters_.refused_not_finite;
     return Status::kInvalidArgument;
   }
-  if (counters_.imu > 0 && sample.stamp <= state_.stamp) {
+  if (!is_next(sample.stamp)) {
     ++counters_.refused_stamp;
     return Status::kStale;
   }
-  ++counters_.imu;
-  // A gap is not integrated over: at most 20 ms, the rest is caught up by the fixes.
-  const double dt_s = counters_.imu == 1 ? 0.0 : std::fmin(seconds(sample.stamp - state_.stamp), 0.02);
+  const bool is_first = ++counters_.imu == 1;
+  const double dt_s = is_first ? 0.0 : seconds(sample.stamp - state_.stamp);
+  const Vector3 before_radps = is_first ? gyro_B : last_rate_B_,
+                before_mps2 = is_first ? force_B : last_force_B_;
   state_.stamp = sample.stamp;
+  last_rate_B_ = gyro_B;
   last_force_B_ = force_B;
+  mean_force_B_ = is_first ? force_B : Vector3(mean_force_B_ + kMeanForceGain * (force_B - mean_force_B_));
   if (!started_) return Status::kOk;
 
-  state_.w_WB_B = gyro_B - gyro_bias_B_;
-  state_.q_WB = (state_.q_WB * small_rotation(dt_s * state_.w_WB_B)).normalized();
-  force_W_ = state_.q_WB.toRotationMatrix() * (force_B - accel_bias_B_);
-  const Vector3 a_W = force_W_ - Vector3(0.0, 0.0, core::kGravity_mps2);
-  state_.p_WB += dt_s * state_.v_WB + (0.5 * dt_s * dt_s) * a_W;
-  state_.v_WB += dt_s * a_W;
-
-  if (anchor_) shift_.grow(config_.drift_ratio * dt_s * state_.v_WB.norm());
-
-  covariance_dt_s_ += dt_s;
+  if (dt_s <= kLongStep_s)
+    integrate(gyro_B, force_B, dt_s);
+  else
+    integrate(0.5 * (gyro_B + before_radps), 0.5 * (force_B + before_mps2), dt_s);
+  grow_between(gyro_B - before_radps, force_B - before_mps2, dt_s);
   if (++since_covariance_ >= kCovarianceEvery) {
     propagate_covariance(covariance_dt_s_);
     since_covariance_ = 0;
@@ -83,6 +63,17 @@ Status Estimator::predict(const firmware_if::ImuSample& sample) noexcept {
   past_.add({state_.stamp, state_.p_WB, state_.v_WB, state_.q_WB});
   reset_if_broken();
   return Status::kOk;
+}
+
+void Estimator::integrate(const Vector3& rate_B_radps, const Vector3& force_B_mps2, double dt_s) noexcept {
+  state_.w_WB_B = rate_B_radps - gyro_bias_B_;
+  state_.q_WB = (state_.q_WB * small_rotation(dt_s * state_.w_WB_B)).normalized();
+  force_W_ = state_.q_WB.toRotationMatrix() * (force_B_mps2 - accel_bias_B_);
+  const Vector3 a_W = force_W_ - Vector3(0.0, 0.0, core::kGravity_mps2);
+  state_.p_WB += dt_s * state_.v_WB + (0.5 * dt_s * dt_s) * a_W;
+  state_.v_WB += dt_s * a_W;
+  if (anchor_) shift_.grow(config_.drift_ratio * dt_s * state_.v_WB.norm());
+  covariance_dt_s_ += dt_s;
 }
 
 void Estimator::propagate_covariance(double dt_s) noexcept {
@@ -167,6 +158,7 @@ void Estimator::start(const firmware_if::OdometrySample& sample, const OdometryS
   state_.v_WB = in_O.v_mps;
   state_.q_WB = in_O.q;
   shift_.begin(0.0);
+  barometer_placed_ = false;
   odometry_stamp_ = sample.stamp;
   begin_filter();
 }
@@ -180,7 +172,7 @@ Status Estimator::update(const firmware_if::GnssFix& fix) noexcept {
     return Status::kInvalidArgument;
   }
   if (!started_) {
-    if (counters_.imu == 0 || !has_heading(fix)) return Status::kNotReady;
+    if (counters_.imu == 0 || !has_heading(fix) || !is_recent(fix.stamp)) return Status::kNotReady;
     last_gnss_ = fix.stamp;
     start(fix);
     ++counters_.gnss;
@@ -192,25 +184,38 @@ Status Estimator::update(const firmware_if::GnssFix& fix) noexcept {
     return Status::kStale;
   }
   last_gnss_ = fix.stamp;
-  const Vector3 dp_m = p_W - shift_.shift_W() - then->p_WB;
-  bool accepted = false;
-  if (follows_odometry(fix.stamp)) {
-    accepted = place_frame(fix, dp_m);
-  } else if (largest_sigma_m(fix) > kMapLost_m) {
-    accepted = place_coarsely(fix, dp_m, v_W - then->v_WB, core::yaw_of(then->q_WB));
-  } else {
-    const double gate_m = config_.gate_sigma * core::hypot2(largest_sigma_m(fix), position_sigma_m());
-    accepted = correct_by(fix, dp_m, v_W - then->v_WB, core::yaw_of(then->q_WB));
-    // The vehicle did not jump with them: the inertial sensors of this second would have felt it.
-    fixes_agreed_ = fixes_agreed_ || accepted;
-    if (!accepted && fixes_agreed_ && dp_m.norm() > gate_m &&
-        shift_.refuse(dp_m, largest_sigma_m(fix), config_.gate_sigma, fix.stamp) ==
-            FrameShift::Verdict::kJumped)
-      ++counters_.jumps;
+  if (lost_) {
+    begin_again(fix);
+    return Status::kNotReady;
   }
+  if (is_settling(fix.stamp)) return Status::kNotReady;
+  const bool moves_alike = fits_in_motion(fix, *then);
+  const bool accepted = take(fix, *then, moves_alike);
   if (accepted) ++counters_.gnss;
+  if (accepted && moves_alike) fix_agreed_ = fix.stamp;
+  if (accepted || follows_odometry(fix.stamp))
+    fix_witness_.accepted();
+  else
+    weigh(fix, *then, moves_alike);
   reset_if_broken();
   return accepted ? Status::kOk : Status::kInvalidArgument;
+}
+
+bool Estimator::take(const firmware_if::GnssFix& fix, const PastStates::Past& then,
+                     bool moves_alike) noexcept {
+  const Vector3 dp_m = to_vector(fix.p_WB_m) - shift_.shift_W() - then.p_WB;
+  const Vector3 dv_mps = to_vector(fix.v_WB_mps) - then.v_WB;
+  if (follows_odometry(fix.stamp)) return place_frame(fix, dp_m);
+  if (largest_sigma_m(fix) > kMapLost_m) return place_coarsely(fix, dp_m, dv_mps, core::yaw_of(then.q_WB));
+  const double gate_m = config_.gate_sigma * core::hypot2(largest_sigma_m(fix), largest_sigma(kPosition));
+  const bool accepted = correct_by(fix, dp_m, dv_mps, core::yaw_of(then.q_WB));
+  // The vehicle did not jump with them: the inertial sensors of this second would have felt it.
+  fixes_agreed_ = fixes_agreed_ || accepted;
+  if (moves_alike && !accepted && fixes_agreed_ && dp_m.norm() > gate_m &&
+      shift_.refuse(dp_m, largest_sigma_m(fix), config_.gate_sigma, fix.stamp) ==
+          FrameShift::Verdict::kJumped)
+    ++counters_.jumps;
+  return accepted;
 }
 
 bool Estimator::correct_by(const firmware_if::GnssFix& fix, const Vector3& dp, const Vector3& dv,
@@ -241,9 +246,12 @@ Status Estimator::update(const firmware_if::BarometerSample& sample) noexcept {
     return Status::kStale;
   }
   last_barometer_ = sample.stamp;
+  if (!barometer_placed_) barometer_shift_m_ = sample.altitude_m - then->p_WB.z();
+  barometer_placed_ = true;
   const double dz_m = sample.altitude_m - barometer_shift_m_ - then->p_WB.z();
   if (follows_odometry(sample.stamp)) {
-    barometer_shift_m_ += kBarometerGain * dz_m;
+    const double most_m = config_.gate_sigma * config_.barometer_sigma_m;  // nonsense does not carry it away
+    barometer_shift_m_ += kBarometerGain * std::clamp(dz_m, -most_m, most_m);
     ++counters_.barometer;
     return Status::kOk;
   }
@@ -266,19 +274,29 @@ Estimator::Innovation Estimator::innovation_of(const firmware_if::OdometrySample
           std::fmax(sample.sigma_speed_mps, kLeastSigma_mps)};
 }
 
-bool Estimator::fits(const Innovation& i) const noexcept {
-  const auto within = [this](int first, const Vector3& innovation, double sigma) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const double S = P_(first + axis, first + axis) + sigma * sigma;
-      if (!(innovation[axis] * innovation[axis] <= config_.gate_sigma * config_.gate_sigma * S)) return false;
-    }
-    return true;
-  };
-  return within(kPosition, i.p_m, i.sigma_p_m) && within(kAttitude, i.angle_rad, i.sigma_rad) &&
-         within(kVelocity, i.v_mps, i.sigma_mps);
+bool Estimator::fits(int first, const Vector3& innovation, double sigma) const noexcept {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double S = P_(first + axis, first + axis) + sigma * sigma;
+    if (!(innovation[axis] * innovation[axis] <= config_.gate_sigma * config_.gate_sigma * S)) return false;
+  }
+  return true;
 }
 
-void Estimator::correct_by(const Innovation& i) noexcept {
+bool Estimator::fits(const Innovation& i) const noexcept {
+  return fits(kPosition, i.p_m, i.sigma_p_m) && fits(kAttitude, i.angle_rad, i.sigma_rad) &&
+         fits(kVelocity, i.v_mps, i.sigma_mps);
+}
+
+void Estimator::correct_by(Innovation i) noexcept {
+  constexpr double kLarge_rad = 0.1;
+  if (i.angle_rad.norm() > kLarge_rad) {
+    // Three axes one after another make no large turn: it is taken as it is.
+    const Vector3 half = 0.5 * i.angle_rad;
+    const Quaternion turn(std::sqrt(std::fmax(1.0 - half.squaredNorm(), 0.0)), half.x(), half.y(), half.z());
+    state_.q_WB = (turn * state_.q_WB).normalized();
+    for (int axis = kAttitude; axis < kAttitude + 3; ++axis) set_sigma(axis, i.sigma_rad);
+    i.angle_rad.setZero();
+  }
   for (int axis = 0; axis < 3; ++axis) {
     (void)correct(kPosition + axis, i.p_m[axis], i.sigma_p_m);
     (void)correct(kAttitude + axis, i.angle_rad[axis], i.sigma_rad);
@@ -286,8 +304,9 @@ void Estimator::correct_by(const Innovation& i) noexcept {
   }
 }
 
-double Estimator::position_sigma_m() const noexcept {
-  return std::sqrt(std::fmax(P_(0, 0), std::fmax(P_(1, 1), P_(2, 2))));
+double Estimator::largest_sigma(int first) const noexcept {
+  return std::sqrt(
+      std::fmax(P_(first, first), std::fmax(P_(first + 1, first + 1), P_(first + 2, first + 2))));
 }
 
 bool Estimator::try_anchor(const firmware_if::OdometrySample& sample, const OdometryState& in_O,
@@ -295,11 +314,18 @@ bool Estimator::try_anchor(const firmware_if::OdometrySample& sample, const Odom
   const bool agrees = candidate_ && candidate_->anchor.reset_counter() == sample.reset_counter &&
                       fits(innovation_of(sample, candidate_->anchor.in_W(in_O), then));
   if (!agrees) {
-    candidate_ = Candidate{OdometryAnchor(in_O, then, sample.reset_counter), sample.stamp};
+    // A frame that lies where it lay stays; and one that is where the vehicle is believed to be is worth no more than that belief.
+    const bool is_same = anchor_ && anchor_->reset_counter() == sample.reset_counter &&
+                         fits(innovation_of(sample, anchor_->in_W(in_O), then));
+    candidate_.reset();
+    if (is_same)
+      candidate_ = Candidate{*anchor_, sample.stamp};
+    else if (largest_sigma(kAttitude) < kMostAnchored_rad && largest_sigma(kVelocity) < kMostAnchored_mps)
+      candidate_ = Candidate{OdometryAnchor(in_O, then, sample.reset_counter), sample.stamp};
     return false;
   }
   if (sample.stamp - candidate_->since < kAnchorPatience) return false;
-  if (position_sigma_m() > kMapLost_m) ++map_number_;
+  if (largest_sigma(kPosition) > kMapLost_m) ++map_number_;
   anchor_ = candidate_->anchor;
   ++counters_.anchored;
   return true;
@@ -312,7 +338,7 @@ Status Estimator::update(const firmware_if::OdometrySample& sample) noexcept {
     return Status::kInvalidArgument;
   }
   if (!started_) {
-    if (counters_.imu == 0) return Status::kNotReady;
+    if (counters_.imu == 0 || !is_recent(sample.stamp)) return Status::kNotReady;
     if (first_odometry_ == MonotonicTime{}) first_odometry_ = sample.stamp;
     if (sample.stamp - first_odometry_ >= kFixPatience) start(sample, in_O);
     return Status::kNotReady;
@@ -323,13 +349,22 @@ Status Estimator::update(const firmware_if::OdometrySample& sample) noexcept {
     return Status::kStale;
   }
   odometry_stamp_ = sample.stamp;
+  if (lost_) {
+    begin_again(sample, in_O, *then);
+    return Status::kNotReady;
+  }
+  if (is_settling(sample.stamp)) return Status::kNotReady;
   // What was lost for long has to agree with itself again, as at its start.
   const bool follows = follows_odometry(sample.stamp) && anchor_->reset_counter() == sample.reset_counter &&
                        fits(innovation_of(sample, anchor_->in_W(in_O), *then));
   if (!follows) {
     ++counters_.refused_gate;
-    if (!try_anchor(sample, in_O, *then)) return Status::kNotReady;
+    if (!try_anchor(sample, in_O, *then)) {
+      if (is_lost_to(sample, in_O)) begin_again(sample, in_O, *then);
+      return Status::kNotReady;
+    }
   }
+  odometry_witness_.accepted();
   candidate_.reset();
   last_odometry_ = sample.stamp;
   correct_by(innovation_of(sample, anchor_->in_W(in_O), *then));
@@ -409,25 +444,14 @@ Status Estimator::follow(const firmware_if::AutopilotState& sample, MonotonicTim
 Status Estimator::state(EstimatedState& out) const noexcept {
   if (!started_) return Status::kNotReady;
   out = state_;
-  out.map_sigma_m = position_sigma_m();
-  out.map_sigma_rad = std::sqrt(std::fmax(P_(6, 6), std::fmax(P_(7, 7), P_(8, 8))));
+  out.map_sigma_m = largest_sigma(kPosition);
+  out.map_sigma_rad = largest_sigma(kAttitude);
   out.shift_W = shift_.shift_W() + followed_shift_W_;
   out.drift_ratio = anchor_ ? config_.drift_ratio : 0.0;
   const bool is_shifted = anchor_ || shift_.sigma_m() > kMapLost_m;
   out.position_sigma_m = is_shifted ? core::hypot2(out.map_sigma_m, shift_.sigma_m()) : out.map_sigma_m;
   out.map_number = map_number_;
   return Status::kOk;
-}
-
-void Estimator::reset_if_broken() noexcept {
-  const bool fine = is_finite(state_.p_WB) && is_finite(state_.v_WB) && state_.q_WB.coeffs().allFinite() &&
-                    is_finite(gyro_bias_B_) && is_finite(accel_bias_B_) && P_.diagonal().allFinite();
-  if (fine) return;
-  ++counters_.resets;
-  ++map_number_;
-  started_ = false;
-  first_odometry_ = {};
-  past_.clear();
 }
 
 }  // namespace roborun::stages

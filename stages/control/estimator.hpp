@@ -17,6 +17,7 @@
 #include "stages/control/frame_shift.hpp"
 #include "stages/control/odometry_anchor.hpp"
 #include "stages/control/past_states.hpp"
+#include "stages/control/witness.hpp"
 
 namespace roborun::stages {
 
@@ -53,6 +54,11 @@ struct EstimatedState {
 /// anew (reset_counter), that comes back, or that jumps without a word is anchored where the vehicle is by then, once its
 /// samples agreed for kAnchorPatience: the state and the map stay. If the state has become uncertain by more than
 /// kMapLost_m meanwhile, or fixes jump against odometry and nobody knows which of both it was, map_number changes.
+///
+/// What was spoilt is noticed: where IMU samples are missing or leap, the covariance grows by what may have happened meanwhile; and
+/// if a source agrees with itself for Witness::kPatience while the state fits neither that nor another one, the state begins anew
+/// where that source says (resets, map_number). One source against the inertial sensors: nobody knows which of both was wrong, so
+/// the source is believed, and the map is not. Fixes that drift against odometry faster than odometry may are not followed.
 class Estimator {
  public:
   struct Config {
@@ -80,21 +86,26 @@ class Estimator {
     std::uint64_t refused_not_finite{}, refused_stamp{}, refused_gate{};
     std::uint64_t anchored{};  ///< How often odometry began, began anew, came back or jumped.
     std::uint64_t jumps{};     ///< Of fixes, that were believed.
-    std::uint64_t resets{};    ///< A NaN got inside: started again from the next fix.
+    std::uint64_t
+        resets{};  ///< The state was poisoned: begun anew from the next fix, or from a source that agrees with itself.
+    std::uint64_t clock_resets{};  ///< Of the IMU's clock, that were believed.
   };
 
   static constexpr Nanos kFixPatience{2'000'000'000};
   static constexpr Nanos kAnchorPatience{200'000'000};
   static constexpr Nanos kOdometryLost{500'000'000};  ///< Since the last accepted sample.
-  static constexpr double kMapLost_m = 0.3;           ///< A published finest cell.
+  static constexpr Nanos kLongestGap{500'000'000};
+  static constexpr Nanos kClockPatience{100'000'000};
+  static constexpr double kMapLost_m = 0.3;  ///< A published finest cell.
 
   /// Precondition, asserted: config.validate() is kOk.
   explicit Estimator(const Config& config) noexcept : config_(config), past_(config.oldest_fix) {
     ROBORUN_ASSERT(config.validate() == Status::kOk);
   }
 
-  /// One IMU sample, in order. Refused (kInvalidArgument, kStale) if not finite or not newer than the one
-  /// before. RT-safe: O(1), about 2 us, every fourth call 5 us more for the covariance.
+  /// One IMU sample, in order. Refused (kInvalidArgument, kStale) if not finite, not newer than the one before or newer by more
+  /// than kLongestGap, unless all others are so for kClockPatience: then the clock is another one, or the sensor is back.
+  /// RT-safe: O(1), about 2 us, every fourth call 5 us more for the covariance.
   [[nodiscard]] Status predict(const firmware_if::ImuSample& sample) noexcept;
   /// A fix, possibly late. The first one, once IMU samples flow, starts the filter (at rest, level).
   /// kNotReady before.
@@ -123,7 +134,9 @@ class Estimator {
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 
  private:
-  static constexpr int kStates = 15;
+  static constexpr int kStates = 15, kPosition = 0, kVelocity = 3, kAttitude = 6, kGyroBias = 9,
+                       kAccelBias = 12;
+  static constexpr double kLongStep_s = 0.02;  ///< Longer than in any flight: between two samples of the IMU.
   using Covariance = Eigen::Matrix<double, kStates, kStates>;
 
   /// A frame of the odometry that is not believed yet.
@@ -137,6 +150,39 @@ class Estimator {
     double sigma_p_m, sigma_rad, sigma_mps;
   };
 
+  /// Whether the time of a sample may be so; a clock that was set is followed.
+  [[nodiscard]] bool is_next(MonotonicTime stamp) noexcept;
+  /// One step of the state over dt_s.
+  void integrate(const Vector3& rate_B_radps, const Vector3& force_B_mps2, double dt_s) noexcept;
+  /// The covariance grows by what two samples in a row leave open: time without samples, or a leap between them.
+  void grow_between(const Vector3& leap_radps, const Vector3& leap_mps2, double dt_s) noexcept;
+  /// While the attitude is uncertain, one measurement changes much. One that was made before the last correction does not know of
+  /// it, and would have it made twice: it is left out.
+  [[nodiscard]] bool is_settling(MonotonicTime stamp) noexcept;
+  /// True if all of a fix was believed. `moves_alike`: fits_in_motion().
+  [[nodiscard]] bool take(const firmware_if::GnssFix& fix, const PastStates::Past& then,
+                          bool moves_alike) noexcept;
+  /// A fix that was refused: is it right, and the state wrong?
+  void weigh(const firmware_if::GnssFix& fix, const PastStates::Past& then, bool moves_alike) noexcept;
+  /// Of an error state that is as uncertain as that, whatever the others are.
+  void set_sigma(int index, double sigma) noexcept;
+  /// The heading alone.
+  void turn_again(double turn_rad, double sigma_rad) noexcept;
+  /// In flight, by a witness, `age` ago.
+  void begin_again(const Vector3& p_WB, const Vector3& v_WB, const Quaternion& q_WB, Nanos age) noexcept;
+  void begin_again(const firmware_if::GnssFix& fix) noexcept;
+  void begin_again(const firmware_if::OdometrySample& sample, const OdometryState& in_O,
+                   const PastStates::Past& then) noexcept;
+  [[nodiscard]] bool fits(int first, const Vector3& innovation, double sigma) const noexcept;
+  [[nodiscard]] bool fits_in_motion(const firmware_if::GnssFix& fix,
+                                    const PastStates::Past& then) const noexcept;
+  /// Odometry agrees with itself, and the state with nothing.
+  [[nodiscard]] bool is_lost_to(const firmware_if::OdometrySample& sample,
+                                const OdometryState& in_O) noexcept;
+  /// Of a first sample: nothing later may be refused because of it.
+  [[nodiscard]] bool is_recent(MonotonicTime stamp) const noexcept {
+    return stamp <= state_.stamp && state_.stamp - stamp <= config_.oldest_fix;
+  }
   void start(const firmware_if::GnssFix& fix) noexcept;
   void start(const firmware_if::OdometrySample& sample, const OdometryState& in_O) noexcept;
   /// At rest in every respect but the state, which is there.
@@ -150,7 +196,7 @@ class Estimator {
                                                 const OdometryState& in_W,
                                                 const PastStates::Past& then) noexcept;
   [[nodiscard]] bool fits(const Innovation& innovation) const noexcept;
-  void correct_by(const Innovation& innovation) noexcept;
+  void correct_by(Innovation innovation) noexcept;
   /// Odometry that is not followed: true if it is from now on.
   bool try_anchor(const firmware_if::OdometrySample& sample, const OdometryState& in_O,
                   const PastStates::Past& then) noexcept;
@@ -159,7 +205,8 @@ class Estimator {
   /// A fix that is coarser than the map's cells, without odometry: true if all of it was believed.
   [[nodiscard]] bool place_coarsely(const firmware_if::GnssFix& fix, const Vector3& dp_m,
                                     const Vector3& dv_mps, double yaw_rad) noexcept;
-  [[nodiscard]] double position_sigma_m() const noexcept;
+  /// Of three error states from `first` on.
+  [[nodiscard]] double largest_sigma(int first) const noexcept;
   void propagate_covariance(double dt_s) noexcept;
   /// One scalar measurement of error state `index`; false if gated out.
   bool correct(int index, double innovation, double sigma) noexcept;
@@ -176,7 +223,10 @@ class Estimator {
   Vector3 gyro_bias_B_ = Vector3::Zero();
   Vector3 accel_bias_B_ = Vector3::Zero();
   Vector3 force_W_ = Vector3::Zero();
+  Vector3 last_rate_B_ = Vector3::Zero();
   Vector3 last_force_B_ = Vector3::Zero();
+  Vector3 mean_force_B_ = Vector3::Zero();  ///< Of 50 ms.
+  MonotonicTime odd_since_{}, odd_last_{};  ///< IMU samples whose time is none that is expected.
   Covariance P_ = Covariance::Zero();
   int since_covariance_{0};
   double covariance_dt_s_{0.0};
@@ -187,8 +237,16 @@ class Estimator {
   std::optional<Candidate> candidate_;
   MonotonicTime first_odometry_{}, last_odometry_{}, odometry_stamp_{};  ///< Heard, accepted, newest.
   FrameShift shift_;
+  Witness fix_witness_, odometry_witness_;
+  double last_heading_rad_{0.0},
+      last_turn_rad_{0.0};  ///< Of a fix that was refused: what it said, and said besides.
+  int headings_alike_{0};
+  bool lost_{false};               ///< The state is none: the IMU's clock was set.
+  MonotonicTime corrected_{};      ///< While settling: when last.
+  MonotonicTime fix_agreed_{};     ///< The last fix that the speed and heading of the state fit.
   bool fixes_agreed_{false};       ///< Since the start: only then one that differs is a jump.
   double barometer_shift_m_{0.0};  ///< Its altitude less the height, while odometry holds that.
+  bool barometer_placed_{true};
   std::uint32_t map_number_{0};
   std::uint32_t followed_frame_{0};
   Vector3 followed_shift_W_ = Vector3::Zero();  ///< From our frame to the autopilot's.

@@ -27,6 +27,8 @@ class FrameShift {
   [[nodiscard]] double sigma_m() const noexcept { return sigma_m_; }
   /// The flown frame begins at a fix with this error; 0: it begins as the odometry's, and the first fix places it.
   void begin(double sigma_m) noexcept;
+  /// The next fix places the frame, whatever is believed until then.
+  void forget() noexcept { placed_ = false; }
   void grow(double drift_m) noexcept { sigma_m_ += drift_m; }
   /// A fix less the place then and the shift. `gate_sigma` as of the estimator.
   [[nodiscard]] Verdict update(const Vector3& innovation_m, double sigma_m, double gate_sigma,

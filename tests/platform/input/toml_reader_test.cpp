@@ -22,6 +22,18 @@ TEST(TomlReader, AWholeNumberIsOne) {
     EXPECT_EQ(complaint(value), "f.toml:2: key: must be a whole number from 8 to 1280") << value;
 }
 
+TEST(TomlReader, AComplaintIsOneLineWhateverTheFileSays) {
+  EXPECT_NE(complaint("n\n").find("not valid TOML"), std::string::npos);
+  EXPECT_EQ(complaint("n\n").find('\n'), std::string::npos) << "the parser quotes what it saw";
+  const toml::table root = parse_toml("f.toml", "\"a\\nb\" = 1");
+  try {
+    TomlReader("f.toml").allow_keys(root, "[x]", {"c"});
+    FAIL() << "an unknown key";
+  } catch (const InputError& error) {
+    EXPECT_EQ(std::string(error.what()), "f.toml:1: a b: unknown key in [x]: must be one of c");
+  }
+}
+
 TEST(TomlReader, NothingNestsWithoutEnd) {
   std::string keys = "a";
   for (int i = 0; i < 500000; ++i) keys += ".a";
