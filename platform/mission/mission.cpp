@@ -253,7 +253,7 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
                     ? std::make_unique<FlightRecorder>(*log_, aircraft_, cameras_, rig_.lidars())
                     : nullptr),
       setup_(flight_config_, config.backends, image_limits(config),
-             parts_of(parts_of(config.own, config.route, cap_mps_), config.change, changed_)),
+             parts_of(parts_of(config.own, config.route, cap_mps_), config.change, changed_), Pages::kHuge),
       prices_(prices_of(config, flight_config_)),
       timed_map_(setup_.parts().map, prices_),
       timed_planner_(setup_.parts().planner, prices_),
