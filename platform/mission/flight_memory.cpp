@@ -71,12 +71,6 @@ std::string program_build_id() {
                                                                                     : std::string();
 }
 
-void FlightMemory::add(std::span<const std::byte> block, bool has_addresses) {
-  // The blocks are the caller's, and not constant: apply() writes them.
-  auto* const first = reinterpret_cast<std::uint64_t*>(const_cast<std::byte*>(block.data()));
-  block_.push_back({first, block.size() / sizeof(std::uint64_t), has_addresses, {}});
-}
-
 void FlightMemory::begin() {
   kept_.clear();
   std::size_t most = 0;

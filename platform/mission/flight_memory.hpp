@@ -44,7 +44,11 @@ class FlightMemory {
     std::uint32_t block;
     std::uint64_t offset;
   };
-  void add(std::span<const std::byte> block, bool has_addresses);
+  /// The blocks are the caller's, and not constant: apply() writes them.
+  void add(std::span<const std::byte> block, bool has_addresses) {
+    auto* const first = reinterpret_cast<std::uint64_t*>(const_cast<std::byte*>(block.data()));
+    block_.push_back({first, block.size() / sizeof(std::uint64_t), has_addresses, {}});
+  }
   [[nodiscard]] std::optional<Place> place_of(std::uint64_t word) const;
   [[nodiscard]] std::uint64_t address_of(const Place& place) const;
   [[nodiscard]] const std::uint64_t* kept(const Block& block, std::size_t page) const;

@@ -123,8 +123,7 @@ report::DecisionRecord record_of(const log::DecisionEntry& e) {
   return r;
 }
 
-constexpr const char* kCustom = "custom";     // what the caller brought, in reports
-constexpr const char* kNoFile = "/dev/null";  // a log for its viewer alone
+constexpr const char* kCustom = "custom";  // what the caller brought, in reports
 
 double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0.0;
@@ -248,7 +247,7 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
       cameras_(faults_.connect(rig_.cameras())),
       log_(config.log.empty() && config.viewer == nullptr
                ? nullptr
-               : std::make_unique<log::FlightLog>(config.log.empty() ? kNoFile : config.log, false)),
+               : std::make_unique<log::FlightLog>(config.log, false)),
       recorder_(!config.log.empty() && why_not_replayed(config).empty()
                     ? std::make_unique<FlightRecorder>(*log_, aircraft_, cameras_, rig_.lidars())
                     : nullptr),

@@ -140,11 +140,11 @@ class Comparison {
     for (std::size_t i = 0; i < recorded.ratio.size() && !first_; ++i)
       if (recorded.ratio[i] != replayed.ratio[i])
         differ("track", fmt::format("motor {}", i + 1),
-               fmt::format("{:.4f}", recorded.ratio[i] / MotorsCheck::kMost),
-               fmt::format("{:.4f}", replayed.ratio[i] / MotorsCheck::kMost));
+               fmt::format("{:.3f}", recorded.ratio[i] / MotorsCheck::kMost),
+               fmt::format("{:.3f}", replayed.ratio[i] / MotorsCheck::kMost));
     if (!first_ && recorded.crc != replayed.crc)
       differ("track", "motor command", fmt::format("CRC-32 {:08x}", recorded.crc),
-             fmt::format("CRC-32 {:08x}, the same to three digits", replayed.crc));
+             fmt::format("CRC-32 {:08x}, the same to two digits", replayed.crc));
     recording_.next();
   }
   void motors_off() {
