@@ -247,7 +247,7 @@ void add_replay_command(CLI::App& app, std::function<int()>& run) {
       "replays what is\n"
       "before it, too, and prints none of it. It leaves the state of each 10th second in "
       "~/.cache/roborun/keyframes, so the\n"
-      "next question about this log is answered in less than a second.\n\n"
+      "next question about this log is answered in about a second.\n\n"
       "--what-if flies on in the simulator with another setting. It takes the files that the flight was "
       "flown "
       "from, and\n"

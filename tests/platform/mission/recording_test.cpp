@@ -420,7 +420,7 @@ TEST_F(Replay, BelievesNoKeyframeAgainstTheLog) {
     for (const auto& [name, bytes] : files) {
       std::string now = damaged ? bytes : earlier;
       if (damaged) now[now.size() / 2] = static_cast<char>(now[now.size() / 2] ^ 1);
-      write(folder + "/" + name, now);
+      write((std::filesystem::path(folder) / name).string(), now);
     }
     const Tail again(path, folder);
     EXPECT_EQ(again.result.keyframe_s, 0.0);
