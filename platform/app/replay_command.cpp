@@ -22,6 +22,7 @@
 #include "platform/app/explain_command.hpp"
 #include "platform/app/flight_source.hpp"
 #include "platform/app/options.hpp"
+#include "platform/input/cache_folder.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/output_file.hpp"
 #include "platform/input/stop_signal.hpp"
@@ -51,6 +52,7 @@ nlohmann::ordered_json json_of(const mission::ReplayResult& r) {
                               {"decisions", r.replayed.decisions},
                               {"digest", fmt::format("{:016x}", r.replayed.digest)},
                               {"recorded_digest", fmt::format("{:016x}", r.recorded.digest)},
+                              {"keyframe_s", r.keyframe_s},
                               {"damage", r.damage},
                               {"difference", nullptr}};
   if (const auto& d = r.difference)
@@ -60,11 +62,19 @@ nlohmann::ordered_json json_of(const mission::ReplayResult& r) {
   return j;
 }
 
-/// A moment behind the end of the log.
-void refuse_beyond(const ReplayOptions& options, const mission::LoggedEnd& logged) {
+void refuse_before(const ReplayOptions& options) {
   if (options.from_s > options.until_s)
     throw InputError(
         fmt::format("--from: {:g} s: must not be behind --until {:g} s", options.from_s, options.until_s));
+}
+
+std::string keyframes_folder() {
+  const std::string cache = input::cache_folder();
+  return cache.empty() ? cache : cache + "/keyframes";
+}
+
+/// A moment behind the end of the log.
+void refuse_beyond(const ReplayOptions& options, const mission::LoggedEnd& logged) {
   const std::string why = mission::beyond(logged, "--from", options.from_s);
   if (!why.empty()) throw InputError(fmt::format("{}: {}", options.file, why));
 }
@@ -77,17 +87,18 @@ void print_replay(const mission::ReplayResult& r) {
   }
   const bool whole = r.replayed.digest != 0;
   fmt::print(
-      "{}: {:.1f} s, {} minor frames, {} decisions{}\n",
+      "{}: {:.1f} s{}, {} minor frames, {} decisions{}\n",
       !r.same() ? "another flight"
       : whole   ? "the same flight"
                 : "the same flight so far",
-      r.seconds, r.replayed.minor_frames, r.replayed.decisions,
+      r.seconds, r.keyframe_s > 0.0 ? fmt::format(" (the first {:g} s before)", r.keyframe_s) : "",
+      r.replayed.minor_frames, r.replayed.decisions,
       whole ? fmt::format(", digest {:016x}, recorded {:016x}", r.replayed.digest, r.recorded.digest) : "");
 }
 
 int replay(const ReplayOptions& options) {
   const bool from = options.from_s >= 0.0;
-  if (from) refuse_beyond(options, mission::end_of(options.file));
+  if (from) refuse_before(options);
   nlohmann::ordered_json decisions = nlohmann::ordered_json::array();
   const auto decided = [&](const log::DecisionEntry& entry) {
     if (seconds(Nanos{entry.time_ns}) < options.from_s) return;
@@ -105,8 +116,12 @@ int replay(const ReplayOptions& options) {
           line->show(
               fmt::format("{:.0f} s replayed, {:.0f} x real time", done_s, done_s / line->elapsed_s()));
       },
-      options.until_s, from ? decided : std::function<void(const log::DecisionEntry&)>());
+      options.until_s, from ? decided : std::function<void(const log::DecisionEntry&)>(),
+      from ? mission::ReplayStart{.from_s = options.from_s, .keyframes = keyframes_folder()}
+           : mission::ReplayStart{});
   line.reset();
+  if (from && r.seconds < options.from_s && !r.difference)
+    refuse_beyond(options, mission::end_of(options.file));
   if (!r.damage.empty()) fmt::print(stderr, "roborun: {}\n", r.damage);
   if (options.json) {
     nlohmann::ordered_json j = json_of(r);
@@ -230,7 +245,9 @@ void add_replay_command(CLI::App& app, std::function<int()>& run) {
       "slowly?\n\n"
       "A log that is cut off or damaged is replayed up to there, and one line says where that is. --from "
       "replays what is\n"
-      "before it, too, and prints none of it: a minute of flight takes a second or two.\n\n"
+      "before it, too, and prints none of it. It leaves the state of each 10th second in "
+      "~/.cache/roborun/keyframes, so the\n"
+      "next question about this log is answered in about a second.\n\n"
       "--what-if flies on in the simulator with another setting. It takes the files that the flight was "
       "flown "
       "from, and\n"

@@ -12,6 +12,7 @@
 #include "platform/board/plugin_loader.hpp"
 #include "platform/board/shipped_boards.hpp"
 #include "platform/board/thread_time.hpp"
+#include "platform/input/cache_folder.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/text_file.hpp"
 #include "platform/input/toml_reader.hpp"
@@ -350,11 +351,8 @@ std::string default_host_path(const BackendNames& backends) {
   std::string name = "host";
   if (!(backends == BackendNames{})) name = fmt::format("host-{}-{}", backends.map, backends.planner);
   std::replace(name.begin(), name.end(), ':', '_');
-  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache != '\0')
-    return fmt::format("{}/roborun/{}.toml", cache, name);
-  if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
-    return fmt::format("{}/.cache/roborun/{}.toml", home, name);
-  return fmt::format("roborun-{}.toml", name);
+  const std::string folder = input::cache_folder();
+  return folder.empty() ? fmt::format("roborun-{}.toml", name) : fmt::format("{}/{}.toml", folder, name);
 }
 
 Profile host(const std::string& path, const BackendNames& backends, double factor, std::string& note) {

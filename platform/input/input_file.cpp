@@ -49,6 +49,13 @@ std::size_t InputFile::read(std::span<char> to) {
   return done;
 }
 
+void InputFile::seek(std::uint64_t at) {
+  buffer_.clear();
+  at_ = 0;
+  if (lseek(fd_, static_cast<off_t>(at), SEEK_SET) < 0)
+    throw InputError(fmt::format("{}: cannot be read from its byte {} on: {}", name_, at, strerror(errno)));
+}
+
 bool InputFile::line(std::string& to, std::size_t most_bytes) {
   ++lines_;
   std::size_t end = buffer_.find('\n', at_);

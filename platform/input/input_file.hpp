@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -21,6 +22,8 @@ class InputFile {
   /// As many bytes as there are: fewer than asked for only at the end. Throws InputError (a folder: "cannot be
   /// read: Is a directory").
   [[nodiscard]] std::size_t read(std::span<char> to);
+  /// On to that byte. Throws InputError, also for what has no such places, as a pipe.
+  void seek(std::uint64_t at);
   /// The next line without its end; false at the end. Throws InputError, also for a line of more than
   /// `most_bytes`.
   [[nodiscard]] bool line(std::string& to, std::size_t most_bytes);

@@ -30,7 +30,7 @@ class FlightLog final : public LogSink {
   inline static constexpr const char* kInputsTopic = "/inputs";
   inline static constexpr const char* kInputsEncoding = "roborun.inputs";
 
-  /// Throws InputError as LogFile. `synced` as there.
+  /// Throws InputError as LogFile. Path (empty: for show_to() alone) and `synced` as there.
   FlightLog(const std::string& path, bool synced);
   /// As finish().
   ~FlightLog() override;

@@ -16,7 +16,7 @@ class ByteSink {
 
 class LogFile final : public ByteSink {
  public:
-  /// Empties the file that is there. `synced`: its name, and each append(), are on the disk when it returns; for threads that may wait. Throws
+  /// Empties the file that is there; an empty path is no file: what is appended is gone. `synced`: its name, and each append(), are on the disk when it returns; for threads that may wait. Throws
   /// InputError "PATH: cannot be written: WHY".
   LogFile(const std::string& path, bool synced);
   ~LogFile() override;

@@ -48,6 +48,11 @@ class McapReader {
   /// Empty: the file is whole as far as it was read; at the end: whole. Otherwise one line: "PATH: byte N: WHY; whole until
   /// T s", and nothing can be read behind it.
   [[nodiscard]] const std::string& damage() const noexcept { return damage_; }
+  /// The byte where the chunk of the last message begins.
+  [[nodiscard]] std::uint64_t chunk_at() const noexcept { return record_at_; }
+  /// On to the chunk that begins there. What is left out is not verified, nor are the CRC and the counts of the whole. Throws
+  /// InputError for a file that is none, such as a pipe.
+  void skip_to(std::uint64_t chunk_at);
   [[nodiscard]] const std::string& profile() const noexcept { return profile_; }
   [[nodiscard]] const std::string& library() const noexcept { return library_; }
   /// What was met so far: by id, and in the order of the file.
@@ -92,6 +97,7 @@ class McapReader {
   std::string chunk_;
   Get in_chunk_{{}};  ///< What is left of it.
   bool got_message_{false};
+  bool skipped_{false};  ///< Not all was read.
   std::uint64_t summary_start_{0};
   std::string damage_, profile_, library_;
   std::map<std::uint16_t, Schema> schemas_;

@@ -1,10 +1,13 @@
 #include "platform/mission/flight_setup.hpp"
 
 #include <fmt/format.h>
+#include <sys/mman.h>
 
 #include <map>
 
 #include "platform/input/input_error.hpp"
+#include "stages/perception/brick_map.hpp"
+#include "stages/planning/rrt_star.hpp"
 
 namespace roborun::mission {
 namespace {
@@ -15,11 +18,22 @@ board::PartRequest request_of(const flight::FlightConfig& config, const board::I
 
 }  // namespace
 
+FlightSetup::Block::Block(std::size_t bytes, Pages pages) {
+  void* const block = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (block == MAP_FAILED) throw InputError("memory plan: not enough memory");
+  if (pages == Pages::kHuge) (void)madvise(block, bytes, MADV_HUGEPAGE);  // a kernel without: normal ones
+  bytes_ = {static_cast<std::byte*>(block), bytes};
+}
+
+FlightSetup::Block::~Block() { (void)munmap(bytes_.data(), bytes_.size()); }
+
 FlightSetup::FlightSetup(const flight::FlightConfig& config, const board::BackendNames& backends,
-                         const board::ImageLimits& images, const board::OwnParts& own)
-    : block_(flight::FlightSystem::arena_bytes(config) + board::backend_bytes(map_bounds_W(config), images) +
-             4096),
-      arena_(block_),
+                         const board::ImageLimits& images, const board::OwnParts& own, Pages pages)
+    : all_own_(backends == board::BackendNames{} && own.empty()),
+      block_(flight::FlightSystem::arena_bytes(config) + board::backend_bytes(map_bounds_W(config), images) +
+                 4096,
+             pages),
+      arena_(block_.bytes()),
       parts_(board::make_backends(backends, request_of(config, images), arena_, own)),
       policy_(own.policy ? own.policy(config) : nullptr) {
   if (parts_.ways != nullptr && !flight::knows_ways(config.design))
@@ -29,6 +43,15 @@ FlightSetup::FlightSetup(const flight::FlightConfig& config, const board::Backen
 
 void FlightSetup::check() const {
   if (arena_.exhausted()) throw InputError("memory plan: the arena is too small for this world");
+}
+
+bool FlightSetup::add_to(FlightMemory& memory) const {
+  if (!all_own_) return false;
+  memory.add_data(block_.bytes());
+  memory.add_object(arena_);
+  memory.add_object(static_cast<const stages::BrickMap&>(*parts_.map));
+  memory.add_object(static_cast<const stages::RrtStar&>(*parts_.planner));
+  return true;
 }
 
 std::vector<report::PoolUse> FlightSetup::pools() const {

@@ -82,7 +82,7 @@ struct FlightTotals {
 
 /// Of a motor command: its exact bits as a CRC-32, and its ratios to 1/kMost, for who reads a difference.
 struct MotorsCheck {
-  static constexpr double kMost = 4095.0;
+  static constexpr double kMost = 255.0;
   std::uint32_t crc{};
   std::array<std::uint16_t, 4> ratio{};
   bool operator==(const MotorsCheck&) const = default;

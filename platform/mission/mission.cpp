@@ -124,8 +124,7 @@ report::DecisionRecord record_of(const log::DecisionEntry& e) {
   return r;
 }
 
-constexpr const char* kCustom = "custom";     // what the caller brought, in reports
-constexpr const char* kNoFile = "/dev/null";  // a log for its viewer alone
+constexpr const char* kCustom = "custom";  // what the caller brought, in reports
 
 double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0.0;
@@ -249,12 +248,12 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
       cameras_(faults_.connect(rig_.cameras())),
       log_(config.log.empty() && config.viewer == nullptr
                ? nullptr
-               : std::make_unique<log::FlightLog>(config.log.empty() ? kNoFile : config.log, false)),
+               : std::make_unique<log::FlightLog>(config.log, false)),
       recorder_(!config.log.empty() && why_not_replayed(config).empty()
                     ? std::make_unique<FlightRecorder>(*log_, aircraft_, cameras_, rig_.lidars())
                     : nullptr),
       setup_(flight_config_, config.backends, image_limits(config),
-             parts_of(parts_of(config.own, config.route, cap_mps_), config.change, changed_)),
+             parts_of(parts_of(config.own, config.route, cap_mps_), config.change, changed_), Pages::kHuge),
       prices_(prices_of(config, flight_config_)),
       timed_map_(setup_.parts().map, prices_),
       timed_planner_(setup_.parts().planner, prices_),

@@ -8,8 +8,10 @@
 #include "platform/flight/lockstep_flight.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/json_reader.hpp"
+#include "platform/log/crc32.hpp"
 #include "platform/log/flight_log.hpp"
 #include "platform/mission/decision_values.hpp"
+#include "platform/mission/flight_memory.hpp"
 #include "platform/mission/flight_records.hpp"
 #include "platform/mission/flight_setup.hpp"
 
@@ -29,6 +31,7 @@ bool Recording::read_configuration(const log::Message& message) {
   if (message.channel->topic != "/configuration") return false;
   std::string why;
   try {
+    configuration_ = message.data;
     const nlohmann::ordered_json json = input::parse_json(message.data);
     why = json.at("replay").get<std::string>();
     if (why.empty()) flight_ = recorded_flight_from(json.at("flight").dump());
@@ -58,10 +61,39 @@ void Recording::read_message() {
                                    error.what()));
     }
     at_ = 0;
+    chunk_at_ = reader_.chunk_at();
+    crc_ = log::crc32(message.data);
     if (!inputs_.records.empty()) return;
   }
   break_off(reader_.damage().empty() ? fmt::format("{}: the inputs end before the flight", path_)
                                      : reader_.damage());
+}
+
+InputsPosition Recording::position() const noexcept {
+  return {chunk_at_, sequence_ - 1, crc_, static_cast<std::uint32_t>(at_ - 1)};
+}
+
+bool Recording::skip_to(const InputsPosition& position) {
+  try {
+    reader_.skip_to(position.chunk_at);
+  } catch (const InputError&) {
+    return false;
+  }
+  for (log::Message message; reader_.next(message);) {
+    if (message.channel->message_encoding != log::FlightLog::kInputsEncoding ||
+        message.sequence < position.sequence)
+      continue;
+    if (message.sequence != position.sequence || log::crc32(message.data) != position.crc) return false;
+    inputs_ = records_from(message.data);
+    if (position.record >= inputs_.records.size()) return false;
+    sequence_ = position.sequence + 1;
+    chunk_at_ = position.chunk_at;
+    crc_ = position.crc;
+    at_ = position.record;
+    next();
+    return true;
+  }
+  return false;
 }
 
 void Recording::end() {
@@ -108,11 +140,11 @@ class Comparison {
     for (std::size_t i = 0; i < recorded.ratio.size() && !first_; ++i)
       if (recorded.ratio[i] != replayed.ratio[i])
         differ("track", fmt::format("motor {}", i + 1),
-               fmt::format("{:.4f}", recorded.ratio[i] / MotorsCheck::kMost),
-               fmt::format("{:.4f}", replayed.ratio[i] / MotorsCheck::kMost));
+               fmt::format("{:.3f}", recorded.ratio[i] / MotorsCheck::kMost),
+               fmt::format("{:.3f}", replayed.ratio[i] / MotorsCheck::kMost));
     if (!first_ && recorded.crc != replayed.crc)
       differ("track", "motor command", fmt::format("CRC-32 {:08x}", recorded.crc),
-             fmt::format("CRC-32 {:08x}, the same to three digits", replayed.crc));
+             fmt::format("CRC-32 {:08x}, the same to two digits", replayed.crc));
     recording_.next();
   }
   void motors_off() {
@@ -167,10 +199,22 @@ class ReplayedSensor final : public Device {
   Recording& recording_;
 };
 
+/// As many as there are, in `memory`, which grows for those of a frame larger than its device makes alone.
+template <typename Pixel>
+std::span<const Pixel> pixels_of(std::string_view bytes, std::vector<Pixel>& memory) {
+  const std::size_t count = bytes.size() / sizeof(Pixel);
+  if (count > memory.size()) memory.resize(count);
+  std::memcpy(memory.data(), bytes.data(), count * sizeof(Pixel));
+  return std::span(memory).first(count);
+}
+
 class ReplayedCamera final : public firmware_if::DepthCamera {
  public:
   ReplayedCamera(Recording& recording, std::uint32_t index)
-      : recording_(recording), index_(index), mount_(recording.flight().mounts[index]) {}
+      : recording_(recording), index_(index), mount_(recording.flight().mounts[index]) {
+    const CameraSpec& camera = recording.flight().sensors.cameras[index];
+    depth_m_.resize(std::size_t{camera.width} * camera.height);
+  }
   [[nodiscard]] Status read(firmware_if::DepthFrame& frame) noexcept override {
     if (recording_.kind() != RecordKind::kDepth) return Status::kNotReady;
     GetField get(recording_.payload());
@@ -179,13 +223,15 @@ class ReplayedCamera final : public firmware_if::DepthCamera {
     if (index != index_) return Status::kNotReady;
     each_field(get, frame);
     // A size that does not fit the pixels is for the stages to refuse, as from any driver.
-    depth_m_.resize(get.rest().size() / sizeof(float));
-    std::memcpy(depth_m_.data(), get.rest().data(), depth_m_.size() * sizeof(float));
-    frame.depth_m = depth_m_;
+    frame.depth_m = pixels_of(get.rest(), depth_m_);
     recording_.next();
     return Status::kOk;
   }
   [[nodiscard]] const firmware_if::CameraMount& mount() const noexcept override { return mount_; }
+  /// What the flight may still point at.
+  [[nodiscard]] std::span<const std::byte> memory() const noexcept {
+    return std::as_bytes(std::span(depth_m_));
+  }
 
  private:
   Recording& recording_;
@@ -197,7 +243,10 @@ class ReplayedCamera final : public firmware_if::DepthCamera {
 class ReplayedLidar final : public firmware_if::Lidar {
  public:
   ReplayedLidar(Recording& recording, std::uint32_t index)
-      : recording_(recording), index_(index), mount_(recording.flight().lidar_mounts[index]) {}
+      : recording_(recording), index_(index), mount_(recording.flight().lidar_mounts[index]) {
+    const LidarSpec& lidar = recording.flight().sensors.lidars[index];
+    point_L_m_.resize(std::size_t{lidar.rings} * lidar.columns);
+  }
   [[nodiscard]] Status read(firmware_if::LidarSweep& sweep) noexcept override {
     if (recording_.kind() != RecordKind::kLidar) return Status::kNotReady;
     GetField get(recording_.payload());
@@ -205,13 +254,14 @@ class ReplayedLidar final : public firmware_if::Lidar {
     get(index);
     if (index != index_) return Status::kNotReady;
     each_field(get, sweep);
-    point_L_m_.resize(get.rest().size() / sizeof(point_L_m_[0]));
-    std::memcpy(point_L_m_.data(), get.rest().data(), point_L_m_.size() * sizeof(point_L_m_[0]));
-    sweep.points_L_m = point_L_m_;
+    sweep.points_L_m = pixels_of(get.rest(), point_L_m_);
     recording_.next();
     return Status::kOk;
   }
   [[nodiscard]] const firmware_if::CameraMount& mount() const noexcept override { return mount_; }
+  [[nodiscard]] std::span<const std::byte> memory() const noexcept {
+    return std::as_bytes(std::span(point_L_m_));
+  }
 
  private:
   Recording& recording_;
@@ -293,12 +343,15 @@ struct Devices {
 
 class Replay {
  public:
-  explicit Replay(const std::string& path);
+  Replay(const std::string& path, const ReplayStart& start);
+  /// To the latest keyframe before what was asked for, if there is one. False: it is of another log, and nothing may follow.
+  [[nodiscard]] bool begin(double until_s);
   ReplayResult run(const std::function<void(double)>& progress, double until_s,
                    const std::function<void(const log::DecisionEntry&)>& decided);
 
  private:
   void give_goals();
+  void keep_keyframe();
   void step(const std::function<void(const log::DecisionEntry&)>& decided);
 
   Recording recording_;
@@ -311,9 +364,13 @@ class Replay {
   FlightSetup setup_;
   flight::LockstepFlight flight_;
   ReplayResult result_;
+  FlightMemory memory_;
+  ReplayStart start_;
+  Keyframes keyframes_;
+  std::uint64_t next_keyframe_{std::numeric_limits<std::uint64_t>::max()};  ///< Minor frames before it.
 };
 
-Replay::Replay(const std::string& path)
+Replay::Replay(const std::string& path, const ReplayStart& start)
     : recording_(path),
       comparison_(recording_),
       aircraft_(recording_, digest_, comparison_),
@@ -322,10 +379,42 @@ Replay::Replay(const std::string& path)
       setup_(recording_.flight().flight, recording_.flight().backends,
              board::image_limits(recording_.flight().sensors, recording_.flight().flight.vehicle,
                                  lattice_of(recording_.flight().flight)),
-             parts_of({}, recording_.flight().change, changed_)),
+             parts_of({}, recording_.flight().change, changed_), Pages::kHuge),
       flight_(recording_.flight().flight, aircraft_, cameras_.pointers, setup_.parts(), setup_.arena(),
-              lidars_.pointers) {
+              lidars_.pointers),
+      start_(start),
+      keyframes_(setup_.add_to(memory_) ? start.keyframes : std::string(), recording_.configuration()) {
   setup_.check();
+  memory_.add_object(flight_);
+  memory_.add_object(digest_);
+  memory_.add_object(result_.replayed);
+  for (const ReplayedCamera& camera : cameras_.device) memory_.add_data(camera.memory());
+  for (const ReplayedLidar& lidar : lidars_.device) memory_.add_data(lidar.memory());
+}
+
+bool Replay::begin(double until_s) {
+  if (!keyframes_.are_kept()) return true;
+  const Nanos minor_frame = recording_.flight().flight.minor_frame;
+  const std::optional<Keyframe> keyframe =
+      keyframes_.before(static_cast<std::uint64_t>(start_.from_s / seconds(minor_frame)));
+  next_keyframe_ = (keyframe ? keyframe->frames : 0) + static_cast<std::uint64_t>(start_.every / minor_frame);
+  // Before the keyframe: changes are those since the flight was made.
+  if (seconds(next_keyframe_ * minor_frame) < until_s) memory_.begin();
+  if (!keyframe) return true;
+  if (!recording_.skip_to(keyframe->position)) return false;
+  try {
+    memory_.apply(keyframe->changes);
+  } catch (const InputError&) {
+    return false;
+  }
+  result_.keyframe_s = seconds(flight_.now().time_since_epoch());
+  return recording_.kind() == RecordKind::kFrame && result_.replayed.minor_frames == keyframe->frames;
+}
+
+void Replay::keep_keyframe() {
+  if (!keyframes_.has(next_keyframe_))
+    keyframes_.keep({result_.replayed.minor_frames, recording_.position(), memory_.changes()});
+  next_keyframe_ += static_cast<std::uint64_t>(start_.every / recording_.flight().flight.minor_frame);
 }
 
 void Replay::give_goals() {
@@ -370,6 +459,7 @@ ReplayResult Replay::run(const std::function<void(double)>& progress, double unt
       continue;
     }
     if (seconds((flight_.now() + recording_.flight().flight.minor_frame).time_since_epoch()) > until_s) break;
+    if (result_.replayed.minor_frames == next_keyframe_) keep_keyframe();
     step(decided);
     if (comparison_.first()) break;
     if (progress && result_.seconds >= told_s + 1.0) progress(told_s = result_.seconds);
@@ -390,8 +480,25 @@ ReplayResult Replay::run(const std::function<void(double)>& progress, double unt
 }  // namespace
 
 ReplayResult replay_flight(const std::string& path, const std::function<void(double)>& progress,
-                           double until_s, const std::function<void(const log::DecisionEntry&)>& decided) {
-  return std::make_unique<Replay>(path)->run(progress, until_s, decided);
+                           double until_s, const std::function<void(const log::DecisionEntry&)>& decided,
+                           const ReplayStart& start) {
+  std::uint64_t told = 0;
+  const auto tell_once = [&](const log::DecisionEntry& entry) {
+    if (entry.number <= told) return;
+    told = entry.number;
+    decided(entry);
+  };
+  const std::function<void(const log::DecisionEntry&)> tell =
+      decided ? tell_once : std::function<void(const log::DecisionEntry&)>();
+  if (!start.keyframes.empty()) {
+    const auto replay = std::make_unique<Replay>(path, start);
+    if (replay->begin(until_s)) {
+      ReplayResult result = replay->run(progress, until_s, tell);
+      if (result.same() || result.keyframe_s == 0.0) return result;
+    }
+  }
+  // No keyframe is believed against the log: what differs behind one is replayed from the beginning.
+  return std::make_unique<Replay>(path, ReplayStart{})->run(progress, until_s, tell);
 }
 
 }  // namespace roborun::mission

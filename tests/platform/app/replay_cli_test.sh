@@ -7,6 +7,7 @@ data=$2
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
+export XDG_CACHE_HOME=$work/cache
 exits() { # CODE COMMAND...
   local wanted=$1 code
   shift

@@ -3,11 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "platform/board/board_profile.hpp"
 #include "platform/input/input_error.hpp"
@@ -335,6 +339,106 @@ TEST_F(Replay, NamesTheFirstDifferenceWithStageAndValues) {
   ASSERT_TRUE(imu.difference.has_value());
   EXPECT_EQ(imu.difference->stage, "track");
   EXPECT_NEAR(imu.difference->time_s, 5.0, 0.1);
+}
+
+/// A replay of what is behind 13 s, with keyframes each 3 s.
+struct Tail {
+  Tail(const std::string& path, const std::string& folder, double from_s = 13.0)
+      : result(replay_flight(path, {}, std::numeric_limits<double>::infinity(),
+                             [&](const log::DecisionEntry& entry) {
+                               if (seconds(Nanos{entry.time_ns}) >= from_s)
+                                 decisions.push_back(log::decision_json(entry));
+                             },
+                             {.from_s = from_s, .keyframes = folder, .every = Nanos{3'000'000'000}})) {}
+  std::vector<std::string> decisions;
+  ReplayResult result;
+};
+
+std::map<std::string, std::string> files_of(const std::string& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    files[entry.path().filename().string()] = read(entry.path().string());
+  return files;
+}
+
+TEST_F(Replay, FromAKeyframeIsTheSameFlight) {
+  const std::string path = record();
+  const std::string folder = test::scratch("keyframes");
+  const Tail first(path, folder);
+  ASSERT_TRUE(first.result.same());
+  EXPECT_EQ(first.result.keyframe_s, 0.0);
+  ASSERT_GE(first.decisions.size(), 2U);
+  ASSERT_GE(files_of(folder).size(), 4U);
+  const Tail again(path, folder);
+  EXPECT_DOUBLE_EQ(again.result.keyframe_s, 12.0);
+  EXPECT_TRUE(again.result.same()) << "its map in the end, too";
+  EXPECT_EQ(again.result.replayed, first.result.replayed);
+  EXPECT_NE(again.result.replayed.digest, 0U);
+  EXPECT_EQ(again.decisions, first.decisions);
+}
+
+TEST_F(Replay, StartsFromAKeyframeWhereverItsMemoryIs) {
+  const std::string path = record();
+  const std::string folder = test::scratch("elsewhere");
+  const Tail first(path, folder);
+  // Flights at once cannot stand at the same place.
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 3; ++i)
+    threads.emplace_back([&] {
+      const Tail again(path, folder);
+      EXPECT_DOUBLE_EQ(again.result.keyframe_s, 12.0);
+      EXPECT_TRUE(again.result.same());
+      EXPECT_EQ(again.decisions, first.decisions);
+    });
+  for (std::thread& thread : threads) thread.join();
+}
+
+TEST_F(Replay, BelievesNoKeyframeAgainstTheLog) {
+  const std::string path = record();
+  const std::string folder = test::scratch("doubtful");
+  const Tail first(path, folder);
+  ASSERT_TRUE(first.result.same());
+  // A log that says another motor command than the flight gave, behind the keyframe.
+  int commands = 0;
+  const std::string other = changed_log(path, [&commands](RecordKind kind, std::string& payload) {
+    if (kind != RecordKind::kMotors || ++commands < 5500) return false;
+    payload[4] = static_cast<char>(payload[4] + 8);
+    return true;
+  });
+  const Tail differs(other, folder, 12.5);
+  ASSERT_TRUE(differs.result.difference.has_value());
+  EXPECT_EQ(differs.result.keyframe_s, 0.0) << "replayed from the beginning";
+  EXPECT_EQ(differs.result.difference->what, "motor 1");
+  EXPECT_GT(differs.result.seconds, 12.5);
+  // Files that are damaged, and one of another moment under this one's name.
+  const auto files = files_of(folder);
+  std::string earlier;
+  for (const auto& [name, bytes] : files)
+    if (name.find("-2400.") != std::string::npos) earlier = bytes;
+  ASSERT_FALSE(earlier.empty());
+  for (const bool damaged : {true, false}) {
+    for (const auto& [name, bytes] : files) {
+      std::string now = damaged ? bytes : earlier;
+      if (damaged) now[now.size() / 2] = static_cast<char>(now[now.size() / 2] ^ 1);
+      write((std::filesystem::path(folder) / name).string(), now);
+    }
+    const Tail again(path, folder);
+    EXPECT_EQ(again.result.keyframe_s, 0.0);
+    EXPECT_TRUE(again.result.same());
+    EXPECT_EQ(again.decisions, first.decisions) << "each told once";
+  }
+}
+
+TEST_F(Replay, ReplaysWithoutKeyframesWhereNoneCanBeKept) {
+  const std::string path = record();
+  const std::string file = test::scratch("no_folder");
+  write(file, "a file\n");
+  for (int i = 0; i < 2; ++i) {
+    const Tail tail(path, file);
+    EXPECT_TRUE(tail.result.same());
+    EXPECT_EQ(tail.result.keyframe_s, 0.0);
+  }
+  EXPECT_EQ(read(file), "a file\n");
 }
 
 TEST_F(Replay, RefusesWhatIsNoLog) {
