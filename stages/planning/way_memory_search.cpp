@@ -10,15 +10,17 @@ namespace {
 
 constexpr double kCost_m = 0.01;  // of costs
 constexpr std::uint32_t kNodesPerPoll = 256;
-constexpr double kDoubtful = 4.0;        // times as dear as what is unknown
-constexpr double kWaits = 16.0;          // after so many what is unknown costs twice as much
+constexpr double kDoubtful = 4.0;  // times as dear as what is unknown
+constexpr double kWaits =
+    16.0;  // after so many what is unknown costs twice as much, after twice as many five times
 constexpr std::uint32_t kBeyond = 3000;  // units of cost that the search runs on beyond the vehicle
 
 }  // namespace
 
 double WayMemory::price(std::uint32_t position, unsigned room) const noexcept {
   if (is_known_room(room)) return 1.0;
-  const double unknown = kUnknownWeight * (1.0 + position_[position].waits / kWaits);
+  const double waits = position_[position].waits / kWaits;
+  const double unknown = kUnknownWeight * (1.0 + waits * waits);
   return is_doubtful_room(room) ? kDoubtful * unknown : unknown;
 }
 
