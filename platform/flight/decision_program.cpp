@@ -71,12 +71,23 @@ void DecisionProgram::judge() noexcept {
   refusals_before_ = refusals;
 }
 
-void DecisionProgram::look_through_cameras(const stages::PastStates& past) noexcept {
+bool DecisionProgram::place(std::size_t sensor, MonotonicTime stamp, MonotonicTime now, Pose& X_WB) noexcept {
+  constexpr Nanos kSilent{20'000'000};
+  const FlightReport& report = mail_.report.read();
+  if (report.past.pose_at(stamp, X_WB) == Status::kOk) return true;
+  const bool in_time =
+      stamp <= now + stages::FrameGuard::kStampSpread && now <= stamp + stages::FrameGuard::kStampSpread;
+  const bool silent_then = report.past.at(stamp) != nullptr;
+  const bool silent_since = stamp > report.state.stamp && now - report.state.stamp > kSilent;
+  if (in_time && (silent_then || silent_since)) last_usable_[sensor] = std::max(last_usable_[sensor], stamp);
+  return false;
+}
+
+void DecisionProgram::look_through_cameras(MonotonicTime now) noexcept {
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     stages::PosedDepthFrame posed;
     Pose X_WB;
-    if (cameras_[i]->read(posed.frame) != Status::kOk || past.pose_at(posed.frame.stamp, X_WB) != Status::kOk)
-      continue;
+    if (cameras_[i]->read(posed.frame) != Status::kOk || !place(i, posed.frame.stamp, now, X_WB)) continue;
     posed.X_WC = core::camera_pose(X_WB, cameras_[i]->mount());
     posed.error = config_.depth_error[i];
     posed.p_BC_W = posed.X_WC.p_RT - X_WB.p_RT;
@@ -85,11 +96,11 @@ void DecisionProgram::look_through_cameras(const stages::PastStates& past) noexc
   }
 }
 
-void DecisionProgram::look_through_lidar(std::size_t lidar, const stages::PastStates& past) noexcept {
+void DecisionProgram::look_through_lidar(std::size_t lidar, MonotonicTime now) noexcept {
   firmware_if::LidarSweep sweep;
   Pose X_WB;
   if (!clouds_[lidar] || lidars_[lidar]->read(sweep) != Status::kOk ||
-      past.pose_at(sweep.stamp, X_WB) != Status::kOk)
+      !place(kMostCameras + lidar, sweep.stamp, now, X_WB))
     return;
   const Pose X_WL = core::camera_pose(X_WB, lidars_[lidar]->mount());
   const Vector3 p_BL_W = X_WL.p_RT - X_WB.p_RT;
@@ -174,8 +185,8 @@ void DecisionProgram::report_depth(MonotonicTime now) noexcept {
 
 void DecisionProgram::look(const FlightReport& report, MonotonicTime now) noexcept {
   frames_.clear();
-  look_through_cameras(report.past);
-  for (std::size_t i = 0; i < lidars_.size(); ++i) look_through_lidar(i, report.past);
+  look_through_cameras(now);
+  for (std::size_t i = 0; i < lidars_.size(); ++i) look_through_lidar(i, now);
   blur(report.state);
   judge_frames(report.airborne);
   std::size_t kept = 0;

@@ -80,6 +80,7 @@ void FailsafePilot::guard(MonotonicTime now, const DecisionReport& decision) noe
 
 void FailsafePilot::begin(Action action, MonotonicTime now) noexcept {
   action_ = action;
+  came_up_here_ = action == Action::kLand && phase_ == Phase::kTakeOff;
   control_.allow_take_off(action == Action::kGoOn);
   if (action == Action::kHold || action == Action::kLand) control_.brake();
   if (action == Action::kTerminate) aircraft_.terminate();
@@ -98,13 +99,12 @@ void FailsafePilot::land(MonotonicTime now, const DecisionReport& d) noexcept {
   constexpr governor::ConditionSet kNoAdvice = governor::kReturnNeeds;  // nobody looks for a place then
   if (phase_ == Phase::kGround || control_.descending()) return;
   const bool standing = control_.standing(now);
-  if (standing && d.heard && d.site_known) {
-    const Vector3 away = control_.reference().p_W - d.site_W;
-    if (core::hypot2(away.x(), away.y()) < kAtSite_m) {
-      site_was_known_ = true;
-      control_.descend(now, kDescent_mps);
-      return;
-    }
+  const bool chosen = d.heard && d.site_known;
+  const Vector3 away = chosen ? Vector3(control_.reference().p_W - d.site_W) : Vector3::Zero();
+  if (standing && (came_up_here_ || (chosen && core::hypot2(away.x(), away.y()) < kAtSite_m))) {
+    site_was_known_ = true;
+    control_.descend(now, kDescent_mps);
+    return;
   }
   const bool advised = (conditions_ & kNoAdvice) == 0;
   const Nanos patience = !standing ? kStandPatience : advised ? kSitePatience : Nanos{0};

@@ -74,6 +74,7 @@ class FailsafePilot {
   MonotonicTime operator_heard_{};
   MonotonicTime action_since_{};
   bool site_was_known_{false};
+  bool came_up_here_{false};  ///< It lands out of its climb: what is below it is where it came from.
   std::atomic<bool> asked_down_{false};
 };
 

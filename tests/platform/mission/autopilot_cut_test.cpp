@@ -59,7 +59,7 @@ TEST_P(LinkCut, AtTenRandomMomentsTheVehicleStandsAndHasTouchedNothing) {
 
 /// The rule for a link that returns (platform/flight/README.md): ArduCopter has stayed in its mode and is led on; PX4 has left
 /// it by itself, and nobody takes it back.
-/// Not at every moment: where images are missed for too long it holds (platform/mission/README.md).
+/// The last cut is where the goal is near: it is reached before.
 TEST_P(LinkCut, WhenItComesBackTheFlightGoesOnWhereTheModeIsStillOurs) {
   const sitl::World world = middle_world();
   const MissionConfig config = autopilot_config(GetParam());
@@ -92,7 +92,7 @@ TEST_P(LinkCut, WhenItComesBackTheFlightGoesOnWhereTheModeIsStillOurs) {
     EXPECT_TRUE(!is_px4 || way_m < 3.0) << "it stays in Hold: " << way_m;
     went_on += way_m > 10.0 ? 1 : 0;
   }
-  EXPECT_TRUE(is_px4 || went_on >= 1);
+  EXPECT_TRUE(is_px4 || went_on >= 3);
 }
 
 /// The autopilot's estimator is reset in flight, and the same place has coordinates 3 m from those before.
