@@ -45,7 +45,7 @@ inline constexpr std::array<FailsafeThreshold, 13> kFailsafeThresholds = [] {
     {C::kCanTelemetry,    &M::esc_silence_s,      0.5,  0.0},   // five of its status messages
     {C::kLink,            &M::link_silence_s,     2.0,  0.0},
     {C::kWind,            &M::tracking_error_ratio, 1.0,  0.5},   // outside of the box that plans keep free
-    {C::kPlanner,         &M::planner_failures,   20.0, 16.0},  // six is the most seen in a good flight; fast boards fail five times a second; "no way" is an answer
+    {C::kPlanner,         &M::planner_failures,   6.0, 16.0},   // six in a row are seen in good flights, fast boards fail five times a second; "no way" is an answer
     {C::kPlanner,         &M::decision_late_s,    5.0,  0.0},   // it stands at the end of its trajectory by then
     {C::kMap,             &M::map_refusals,       2.5,  0.0},
     {C::kWatchdog,        &M::control_lost,       0.5,  0.1},   // beyond what the controller ever asks for

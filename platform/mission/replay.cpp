@@ -437,9 +437,16 @@ void Replay::step(const std::function<void(const log::DecisionEntry&)>& decided)
     ++result_.replayed.decisions;
     digest_.add(*decision);
     comparison_.decision(*decision);
-    if (decided && !comparison_.first())
-      decided(decision_entry(flight_.system(), *decision, lattice_of(recorded.flight),
-                             result_.replayed.decisions, now, {}));
+    if (decided && !comparison_.first()) {
+      log::DecisionEntry entry = decision_entry(flight_.system(), *decision, lattice_of(recorded.flight),
+                                                result_.replayed.decisions, now, {});
+      stages::EstimatedState state;
+      if (flight_.system().control().estimator().state(state) == Status::kOk) {
+        entry.p_WB = log::numbers_of(state.p_WB);
+        entry.speed_mps = state.v_WB.norm();
+      }
+      decided(entry);
+    }
   }
   if (recording_.kind() == RecordKind::kGiveUp) {
     flight_.system().decision_program().give_up();

@@ -62,6 +62,7 @@ assert all(d["why"] for d in tail["decided"])
 PY
 exits 0 "$roborun" replay flight.mcap --from 12
 has "Decision " out
+check "each says where the vehicle was" test "$(grep -c "at (0.0, 0.0, 0.0) m" out)" -eq 0
 has "the same flight" out
 exits 0 "$roborun" replay flight.mcap
 check "a replay without --from prints no decision" test "$(grep -c Decision out)" -eq 0
