@@ -14,6 +14,12 @@ StageCost slower(const StageCost& cost, double factor) noexcept {
   return result;
 }
 
+CostProfile slower(const CostProfile& profile, double factor) noexcept {
+  CostProfile result = profile;
+  for (StageCost& cost : result.stage) cost = slower(cost, factor);
+  return result;
+}
+
 Status StageCost::validate() const noexcept {
   constexpr double kMost_s = 1e6;
   bool ok = within(per_unit_s, 0.0, kMost_s);

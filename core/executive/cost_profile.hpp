@@ -33,6 +33,9 @@ struct CostProfile {
   [[nodiscard]] Nanos cost(StageId id, const Work& work) const noexcept;
 };
 
+/// Every stage `factor` times as expensive. RT-safe: O(1).
+[[nodiscard]] CostProfile slower(const CostProfile& profile, double factor) noexcept;
+
 /// The authors' machine (four i9 cores, ROS). Map integration and export are their measured costs per volume;
 /// the planner's is their shipped fit at 0.3 and 9.6 m with a constant factor per octave between; point cloud
 /// 0.21 s, depth conversion 0.07 s and diagnostics 0.09 s are fixed, the governor takes the measured 0.10 s

@@ -16,6 +16,13 @@ Status LatencyModel::validate() const noexcept {
   return ok ? Status::kOk : Status::kInvalidArgument;
 }
 
+LatencyModel slower(const LatencyModel& model, double factor) noexcept {
+  LatencyModel result = model;
+  for (double& s : result.fixed_s) s *= factor;
+  for (double& s : result.slope_s_per_m3) s *= factor;
+  return result;
+}
+
 double LatencyModel::latency_s(int level, double volume_m3) const noexcept {
   const auto i = static_cast<std::size_t>(std::clamp(level, 0, kPrecisionLevels - 1));
   return fixed_s[i] + slope_s_per_m3[i] * std::max(volume_m3, 0.0);

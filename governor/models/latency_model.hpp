@@ -22,6 +22,9 @@ struct LatencyModel {
   [[nodiscard]] double latency_s(int level, double volume_m3) const noexcept;
 };
 
+/// Everything `factor` times as long. RT-safe: O(1).
+[[nodiscard]] LatencyModel slower(const LatencyModel& model, double factor) noexcept;
+
 /// Eq. 4: (q0 / p^3 + q1 / p^2 + q2 / p) (q3 v). Negative results are raised to 0.
 struct Eq4 {
   std::array<double, 4> q{};

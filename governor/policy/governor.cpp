@@ -304,11 +304,7 @@ SolverProblem Governor::problem_of(const Task& task, const Precision& precision,
   SolverProblem p;
   p.p_min_m = config_.lattice.finest_m;
   p.delta_d_s = deadline_s * (1.0 - config_.policy.reserve_ratio) - task.overhead_s;
-  p.model = config_.model;
-  for (const Knob knob : kKnobs) {
-    for (double& s : p.model[knob].fixed_s) s *= scale(stage_of(knob));
-    for (double& s : p.model[knob].slope_s_per_m3) s *= scale(stage_of(knob));
-  }
+  for (const Knob knob : kKnobs) p.model[knob] = slower(config_.model[knob], scale(stage_of(knob)));
   p.g_min_m = config_.lattice.cell_size_m(precision.finest);
   p.g_avg_m = config_.lattice.cell_size_m(precision.coarsest);
   p.d_obs_m = std::fmax(profile.closest_obstacle_m, config_.lattice.cell_size_m(precision.coarsest));

@@ -307,8 +307,7 @@ void add_fly_command(CLI::App& app, std::function<int()>& run) {
   fly_app->add_option("--settings", options->source.settings,
                       "Cameras, wind, battery, speed from a TOML file (see platform/README.md)");
   fly_app->add_option("--aim", options->source.aim,
-                      "time, or energy: no faster than what spends least per metre (roborun vehicle check "
-                      "says how fast that is) [that of --settings, or time]");
+                      fmt::format("{} [that of --settings, or time]", kAimText));
   fly_app->add_option(
       "--log", options->log,
       "Write what the flight read, did and why to this MCAP file, for roborun replay, Foxglove and "

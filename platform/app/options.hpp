@@ -19,6 +19,11 @@ CLI::Option* add_number(CLI::App& app, const std::string& name, double& value, d
 CLI::Option* add_whole(CLI::App& app, const std::string& name, int& value, int low, int high,
                        const std::string& text);
 
+/// What --aim says of itself in every command.
+inline constexpr const char* kAimText =
+    "time, or energy: no faster than what spends least per metre (roborun vehicle check says how fast that "
+    "is)";
+
 /// One that would be ignored. Throws InputError "OPTION: goes with PARTNER" if it was given although
 /// `with_partner` does not hold.
 void refuse_alone(const CLI::Option& option, bool with_partner, const std::string& partner);

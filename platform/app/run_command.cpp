@@ -426,11 +426,7 @@ void add_run_command(CLI::App& app, std::function<int()>& run) {
           "What the governor expects stages to cost: paper, host (measured once), or a file of roborun "
           "calibrate")
       ->capture_default_str();
-  command
-      ->add_option("--aim", options->aim,
-                   "time, or energy: no faster than what spends least per metre (roborun vehicle check says "
-                   "how fast that is)")
-      ->capture_default_str();
+  command->add_option("--aim", options->aim, kAimText)->capture_default_str();
   command->add_option("--seed", options->seed, "Seed of the planner")->capture_default_str();
   add_number(*command, "--seconds", options->seconds, 1.0, 86400.0, "Then it lands where it is, 1 .. 86400");
   add_number(*command, "--wait", options->wait_s, 0.0, 3600.0,

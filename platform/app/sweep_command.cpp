@@ -357,9 +357,7 @@ void add_sweep_command(CLI::App& app, std::function<int()>& run) {
       "and foreign several with commas [paper; hard: paper,micro-six; foreign: of the authors' size]");
   sweep_app->add_option("--settings", options->settings,
                         "Cameras, wind, battery, speed from a TOML file (see platform/README.md)");
-  sweep_app->add_option("--aim", options->aim,
-                        "time, or energy: no faster than what spends least per metre (roborun vehicle check "
-                        "says how fast that is) [that of --settings, or time]");
+  sweep_app->add_option("--aim", options->aim, fmt::format("{} [that of --settings, or time]", kAimText));
   sweep_app->add_option("--jobs", options->jobs, "Missions at a time, 1 .. 1024")->capture_default_str();
   sweep_app->add_option("--shard", options->shard, "I/N: only the I-th of N equal parts")
       ->capture_default_str();

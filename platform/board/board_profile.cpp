@@ -299,6 +299,12 @@ BoardProfile board_from_toml(const std::string& path, const std::string& text) {
   return board;
 }
 
+Profile slower(const Profile& profile, double factor) {
+  Profile result{core::slower(profile.costs, factor), profile.model};
+  for (governor::LatencyModel& model : result.model) model = governor::slower(model, factor);
+  return result;
+}
+
 Profile to_profile(const BoardProfile& board, double factor) {
   constexpr std::array<core::StageId, 3> kId{core::StageId::kMap, core::StageId::kExport,
                                              core::StageId::kPlanner};
@@ -306,14 +312,11 @@ Profile to_profile(const BoardProfile& board, double factor) {
   for (std::size_t i = 0; i < core::kStageCount; ++i) profile.costs.stage[i].per_unit_s = board.per_unit_s[i];
   for (std::size_t i = 0; i < 3; ++i) {
     profile.model[i] = board.stage[i].p99;
-    for (double& s : profile.model[i].fixed_s) s *= factor * board.factor;
-    for (double& s : profile.model[i].slope_s_per_m3) s *= factor * board.factor;
     if ((kId[i] == core::StageId::kPlanner ? board.backends.planner : board.backends.map) == "own") continue;
     const governor::LatencyModel& mean = board.stage[i].mean;
     profile.costs.stage[static_cast<std::size_t>(kId[i])] = {mean.fixed_s, 0.0, mean.slope_s_per_m3};
   }
-  for (core::StageCost& cost : profile.costs.stage) cost = core::slower(cost, factor * board.factor);
-  return profile;
+  return slower(profile, factor * board.factor);
 }
 
 namespace {

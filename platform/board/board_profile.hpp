@@ -19,6 +19,9 @@ struct Profile {
   governor::KnobArray<governor::LatencyModel> model{};  ///< Map, export, planner: the 99th percentile.
 };
 
+/// A machine that is `factor` times slower.
+[[nodiscard]] Profile slower(const Profile& profile, double factor);
+
 /// One stage of a board: its models, and how far they are from points that they were not fitted on.
 struct StageModel {
   governor::LatencyModel mean{};

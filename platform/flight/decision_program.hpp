@@ -99,10 +99,10 @@ class DecisionProgram final : public core::LaneProgram {
   void report_depth(MonotonicTime now) noexcept;
   /// Adds the newest images of all cameras, or those of a LiDAR's newest sweep.
   void look_through_cameras(MonotonicTime now) noexcept;
+  void look_through_lidar(std::size_t lidar, MonotonicTime now) noexcept;
   /// The vehicle's pose then. False: nobody knows it; if only because states were missing then, that is no fault of a sensor whose image
   /// is in time: silence has a condition of its own (Condition::kGnss).
   [[nodiscard]] bool place(std::size_t sensor, MonotonicTime stamp, MonotonicTime now, Pose& X_WB) noexcept;
-  void look_through_lidar(std::size_t lidar, MonotonicTime now) noexcept;
   void publish(MonotonicTime due) noexcept;
   /// The estimate's share of what the map keeps away from what it saw: see place_error().
   void blur(const stages::EstimatedState& state) noexcept;

@@ -99,9 +99,11 @@ void FailsafePilot::land(MonotonicTime now, const DecisionReport& d) noexcept {
   constexpr governor::ConditionSet kNoAdvice = governor::kReturnNeeds;  // nobody looks for a place then
   if (phase_ == Phase::kGround || control_.descending()) return;
   const bool standing = control_.standing(now);
-  const bool chosen = d.heard && d.site_known;
-  const Vector3 away = chosen ? Vector3(control_.reference().p_W - d.site_W) : Vector3::Zero();
-  if (standing && (came_up_here_ || (chosen && core::hypot2(away.x(), away.y()) < kAtSite_m))) {
+  const auto is_at_site = [&] {
+    const Vector3 away = control_.reference().p_W - d.site_W;
+    return d.heard && d.site_known && core::hypot2(away.x(), away.y()) < kAtSite_m;
+  };
+  if (standing && (came_up_here_ || is_at_site())) {
     site_was_known_ = true;
     control_.descend(now, kDescent_mps);
     return;

@@ -32,8 +32,7 @@ const DecisionOutput* LockstepFlight::step(const Computer& computer) noexcept {
   if (decision_lane_.in_frame() || decision_lane_.release() > now_) return nullptr;
   decision_clock_.set(now_);
   if (computer.slower != slower_) {
-    costs_ = rated_costs_;
-    for (core::StageCost& cost : costs_.stage) cost = core::slower(cost, computer.slower);
+    costs_ = core::slower(rated_costs_, computer.slower);
     slower_ = computer.slower;
   }
   const std::uint64_t before = system_.decision_program().decisions();

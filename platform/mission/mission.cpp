@@ -134,8 +134,7 @@ double quantile(std::vector<double> values, double q) {
 }
 
 std::vector<core::CostProfile> prices_of(const MissionConfig& config, const flight::FlightConfig& flight) {
-  std::vector<core::CostProfile> prices{flight.costs};
-  for (core::StageCost& cost : prices.front().stage) cost = core::slower(cost, 1.0 / config.host_factor);
+  std::vector<core::CostProfile> prices{core::slower(flight.costs, 1.0 / config.host_factor)};
   if (config.host_costs) prices.push_back(core::on_lattice(*config.host_costs, lattice_of(flight)));
   return prices;
 }

@@ -122,11 +122,8 @@ void ScenarioReader::read_head(Scenario& s) const {
   }
   if (const toml::node* node = head.get("cost_factor")) {
     const double factor = number(*node, "cost_factor", 0.01, 100.0);
-    for (core::StageCost& cost : s.config.flight.costs.stage) cost = core::slower(cost, factor);
-    for (governor::LatencyModel& model : s.config.flight.model) {
-      for (double& fixed_s : model.fixed_s) fixed_s *= factor;
-      for (double& slope_s_per_m3 : model.slope_s_per_m3) slope_s_per_m3 *= factor;
-    }
+    s.config.flight.costs = core::slower(s.config.flight.costs, factor);
+    for (governor::LatencyModel& model : s.config.flight.model) model = governor::slower(model, factor);
   }
   if (const toml::node* node = head.get("answers")) s.config.flight.answers = truth(*node, "answers");
 }

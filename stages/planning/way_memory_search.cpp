@@ -11,8 +11,8 @@ namespace {
 constexpr double kCost_m = 0.01;  // of costs
 constexpr std::uint32_t kNodesPerPoll = 256;
 constexpr double kDoubtful = 4.0;  // times as dear as what is unknown
-constexpr double kWaits =
-    16.0;  // after so many what is unknown costs twice as much, after twice as many five times
+// After so many looks what is unknown costs twice as much, after twice as many five times.
+constexpr double kWaits = 16.0;
 constexpr std::uint32_t kBeyond = 3000;  // units of cost that the search runs on beyond the vehicle
 
 }  // namespace

@@ -15,12 +15,16 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
+KnobArray<LatencyModel> models_of(const core::CostProfile& costs) {
+  return {from_cost(costs.of(core::StageId::kMap)), from_cost(costs.of(core::StageId::kExport)),
+          from_cost(costs.of(core::StageId::kPlanner))};
+}
+
 GovernorConfig paper_config(Design design) {
   static const core::CostProfile costs = core::paper_profile();
   GovernorConfig c;
   c.design = design;
-  c.model = {from_cost(costs.of(core::StageId::kMap)), from_cost(costs.of(core::StageId::kExport)),
-             from_cost(costs.of(core::StageId::kPlanner))};
+  c.model = models_of(costs);
   c.point_cloud_s = 0.37;
   c.governor_s = design == Design::kAware ? 0.10 : 0.0;
   c.smoother_s = 0.01;
@@ -184,9 +188,7 @@ TEST(Governor, FineCellsAreForWhatIsNearAndEndInTime) {
   GovernorConfig config = paper_config(Design::kAware);
   config.lattice = {0.1};
   const core::CostProfile costs = core::on_lattice(core::paper_profile(), config.lattice);
-  config.model = {from_cost(core::slower(costs.of(core::StageId::kMap), 0.1)),
-                  from_cost(core::slower(costs.of(core::StageId::kExport), 0.1)),
-                  from_cost(core::slower(costs.of(core::StageId::kPlanner), 0.1))};
+  config.model = models_of(core::slower(costs, 0.1));
   config.point_cloud_s = 0.037;
   config.governor_s = 0.01;
   Situation situation{0, 100.0};
@@ -209,9 +211,7 @@ TEST(Governor, TakesFinerCellsWhereItIsTightAndTheyCostNothing) {
   config.lattice = {0.15};
   const core::CostProfile costs = core::on_lattice(core::paper_profile(), config.lattice);
   const auto on_board = [&](double slower, double gap_m) {
-    config.model = {from_cost(core::slower(costs.of(core::StageId::kMap), slower)),
-                    from_cost(core::slower(costs.of(core::StageId::kExport), slower)),
-                    from_cost(core::slower(costs.of(core::StageId::kPlanner), slower))};
+    config.model = models_of(core::slower(costs, slower));
     config.point_cloud_s = 0.37 * slower;
     config.governor_s = 0.1 * slower;
     config.smoother_s = 0.01 * slower;

@@ -24,14 +24,9 @@ MissionConfig draggy(governor::Aim aim) {
   v.speed_mps = 7.0;
   v.tilt_rad = 0.75;
   v.measured_stopping.reset();
-  const board::Profile paper = board::paper();
-  config.flight.costs = paper.costs;
-  config.flight.model = paper.model;
-  for (core::StageCost& cost : config.flight.costs.stage) cost = core::slower(cost, 0.1);
-  for (governor::LatencyModel& model : config.flight.model) {
-    for (double& fixed_s : model.fixed_s) fixed_s *= 0.1;
-    for (double& slope_s_per_m3 : model.slope_s_per_m3) slope_s_per_m3 *= 0.1;
-  }
+  const board::Profile board = board::slower(board::paper(), 0.1);
+  config.flight.costs = board.costs;
+  config.flight.model = board.model;
   config.simulator.camera.pixels = 32;
   config.simulator.wind = {Vector3::Zero(), 0.0, 3.0};
   config.flight.aim = aim;

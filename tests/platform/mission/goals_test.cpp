@@ -20,9 +20,8 @@ class GoalFlight : public ::testing::Test {
  protected:
   GoalFlight() : world_(sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {})) {
     const board::Profile profile = board::paper();
-    config_.flight.costs = profile.costs;
+    config_.flight.costs = core::slower(profile.costs, 0.15);
     config_.flight.model = profile.model;
-    for (core::StageCost& cost : config_.flight.costs.stage) cost = core::slower(cost, 0.15);
     config_.judge.time_limit_s = 240.0;
     start_W_ = world_.start_W();
     goal_W_ = world_.goal_W();

@@ -16,15 +16,10 @@ struct CrossingsResult {
 
 /// The costs of the paper's machine times `cost_factor`: 0.15 is the library's.
 inline MissionConfig crossing_mission(double cost_factor, std::uint64_t seed) {
-  const board::Profile profile = board::paper();
+  const board::Profile profile = board::slower(board::paper(), cost_factor);
   MissionConfig config;
   config.flight.costs = profile.costs;
   config.flight.model = profile.model;
-  for (core::StageCost& cost : config.flight.costs.stage) cost = core::slower(cost, cost_factor);
-  for (governor::LatencyModel& model : config.flight.model) {
-    for (double& fixed_s : model.fixed_s) fixed_s *= cost_factor;
-    for (double& slope_s_per_m3 : model.slope_s_per_m3) slope_s_per_m3 *= cost_factor;
-  }
   config.seed = seed;
   config.simulator.camera.pixels = 48;
   config.simulator.camera.range_m = 16.0;

@@ -21,15 +21,11 @@ namespace {
 class RigFlight : public ::testing::Test {
  protected:
   RigFlight() : world_(sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {})) {
-    config_.flight.costs = board::paper().costs;
-    config_.flight.model = board::paper().model;
-    config_.judge.time_limit_s = 240.0;
     // A board on which a decision takes 0.1 s instead of 0.7 s.
-    for (core::StageCost& cost : config_.flight.costs.stage) cost = core::slower(cost, 0.15);
-    for (governor::LatencyModel& model : config_.flight.model) {
-      for (double& fixed_s : model.fixed_s) fixed_s *= 0.15;
-      for (double& slope_s_per_m3 : model.slope_s_per_m3) slope_s_per_m3 *= 0.15;
-    }
+    const board::Profile board = board::slower(board::paper(), 0.15);
+    config_.flight.costs = board.costs;
+    config_.flight.model = board.model;
+    config_.judge.time_limit_s = 240.0;
   }
   /// A D455's field of view, with few pixels: the simulator casts each of them.
   static CameraSpec front() {

@@ -23,15 +23,10 @@ double forest_s(double speed_mps, std::uint64_t seed) {
   vehicle.model.speed_mps = speed_mps;
   MissionConfig config;
   set_vehicle(config, vehicle);
-  const board::Profile paper = board::paper();
+  const board::Profile board = board::slower(board::paper(), 0.1);
   config.flight.seed = seed;
-  config.flight.costs = paper.costs;
-  config.flight.model = paper.model;
-  for (core::StageCost& cost : config.flight.costs.stage) cost = core::slower(cost, 0.1);
-  for (governor::LatencyModel& model : config.flight.model) {
-    for (double& fixed_s : model.fixed_s) fixed_s *= 0.1;
-    for (double& slope_s_per_m3 : model.slope_s_per_m3) slope_s_per_m3 *= 0.1;
-  }
+  config.flight.costs = board.costs;
+  config.flight.model = board.model;
   config.judge.time_limit_s = 300.0;
   sitl::WorldMakerOptions options;
   options.spacing_m = 5.0;

@@ -38,15 +38,10 @@ double where_mps(const SpeedLimits& limits, const std::string& name) {
 double flown_mps(const vehicle::Vehicle& vehicle) {
   const sitl::World world = sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/open.toml", {});
   MissionConfig config = config_of(vehicle);
-  const board::Profile paper = board::paper();
+  const board::Profile board = board::slower(board::paper(), 0.1);
   config.flight.seed = 5;
-  config.flight.costs = paper.costs;
-  config.flight.model = paper.model;
-  for (core::StageCost& cost : config.flight.costs.stage) cost = core::slower(cost, 0.1);
-  for (governor::LatencyModel& model : config.flight.model) {
-    for (double& fixed_s : model.fixed_s) fixed_s *= 0.1;
-    for (double& slope_s_per_m3 : model.slope_s_per_m3) slope_s_per_m3 *= 0.1;
-  }
+  config.flight.costs = board.costs;
+  config.flight.model = board.model;
   for (CameraSpec& camera : config.simulator.rig->cameras) {
     while (camera.width > 200) {
       camera.width /= 2;

@@ -22,14 +22,9 @@ TEST_P(ShippedVehicle, ReachesItsGoalAndKeepsNearItsReference) {
   MissionConfig config;
   set_vehicle(config, vehicle);
   // A board on which a decision takes 0.1 s instead of 0.7 s; images that a test can afford to cast.
-  const board::Profile paper = board::paper();
-  config.flight.costs = paper.costs;
-  config.flight.model = paper.model;
-  for (core::StageCost& cost : config.flight.costs.stage) cost = core::slower(cost, 0.15);
-  for (governor::LatencyModel& model : config.flight.model) {
-    for (double& fixed_s : model.fixed_s) fixed_s *= 0.15;
-    for (double& slope_s_per_m3 : model.slope_s_per_m3) slope_s_per_m3 *= 0.15;
-  }
+  const board::Profile board = board::slower(board::paper(), 0.15);
+  config.flight.costs = board.costs;
+  config.flight.model = board.model;
   for (CameraSpec& camera : config.simulator.rig->cameras) {
     while (camera.width > 200) {
       camera.width /= 2;
