@@ -61,14 +61,16 @@ report::FolderRow row_of(const std::string& name, const mission::LoggedEnd& end)
   using Verdict = report::FolderRow::Verdict;
   return {name,
           "",
-          end.good()       ? Verdict::kReached
+          end.has_verdict  ? (end.passed ? Verdict::kPassed : Verdict::kFailed)
+          : end.good()     ? Verdict::kReached
           : end.has_result ? Verdict::kFailed
                            : Verdict::kUnknown,
           end.reason,
           end.damage,
           end.has_result ? end.time_s : end.recorded_s,
           end.mean_mps,
-          end.closest_m};
+          end.closest_m,
+          end.complaints};
 }
 
 report::FolderRow row_of(const report::MissionResult& r) {
@@ -208,7 +210,7 @@ void add_report_command(CLI::App& app, std::function<int()>& run) {
       "that says so.\n\n"
       "In a folder what holds no flight is named and left out; a log that was cut stands in the table with a "
       "note. Its verdict is\n"
-      "whether the goal was reached.\n\n"
+      "that of its scenario, and of a flight without one whether the goal was reached.\n\n"
       "Exit code: 0 the page was written, 2 bad input.");
   command
       ->add_option("log", options->log,

@@ -33,13 +33,6 @@ std::string file_in(const std::string& folder, const std::string& stem, const ch
   return (fs::path(folder) / (stem + ending)).string();
 }
 
-nlohmann::json json_of(const mission::Check& c) {
-  nlohmann::json j{{"condition", c.condition}, {"passed", c.passed}, {"value", c.value}, {"limit", c.limit}};
-  j["at_s"] = c.at_s >= 0.0 ? nlohmann::json(c.at_s) : nlohmann::json(nullptr);
-  if (!c.why.empty()) j["why"] = c.why;
-  return j;
-}
-
 std::string picture_of(const mission::Scenario& s, const report::MissionReport& flown,
                        const std::vector<std::string>& complaints) {
   const std::string title = fmt::format("{}, seed {}: {}", s.name, s.config.seed,
@@ -55,7 +48,7 @@ nlohmann::json judged(const ScenarioFlight& flight, const ScenarioOutputs& outpu
   s.config.log = outputs.log;
   const report::MissionReport flown = mission::fly_scenario(s);
   const std::vector<mission::Check> checks = mission::checks_of(s, flown);
-  const std::vector<std::string> complaints = mission::complaints_of(s, flown);
+  const std::vector<std::string> complaints = mission::complaints_of(checks);
   nlohmann::json actions = nlohmann::json::array();
   for (const report::FailsafeRecord& r : flown.safety.actions) {
     actions.push_back(
@@ -63,7 +56,7 @@ nlohmann::json judged(const ScenarioFlight& flight, const ScenarioOutputs& outpu
     if (!r.sensor.empty()) actions.back()["sensor"] = r.sensor;
   }
   nlohmann::json all = nlohmann::json::array();
-  for (const mission::Check& c : checks) all.push_back(json_of(c));
+  for (const mission::Check& c : checks) all.push_back(mission::to_json(c));
   nlohmann::json v{{"name", s.name},
                    {"about", s.about},
                    {"seed", s.config.seed},

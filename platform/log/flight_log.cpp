@@ -149,6 +149,7 @@ FlightLog::FlightLog(const std::string& path, bool synced)
   events_ = channel("/events", "foxglove.Log", text_schema());
   dropped_ = channel("/log/dropped", "roborun.Dropped", dropped_schema());
   result_ = channel("/result", "roborun.Result", object_schema("roborun.Result"));
+  verdict_ = channel("/verdict", "roborun.Verdict", object_schema("roborun.Verdict"));
   inputs_ = writer_.add_channel(0, kInputsTopic, kInputsEncoding);
   path_step_ = kStatesPerPoint;
 }
@@ -281,6 +282,10 @@ void FlightLog::event(std::int64_t time_ns, Level level, std::string_view name,
 
 void FlightLog::result(std::int64_t time_ns, std::string_view json) noexcept {
   guarded(drops_.states, [&] { put(result_, time_ns, json); });
+}
+
+void FlightLog::verdict(std::int64_t time_ns, std::string_view json) noexcept {
+  guarded(drops_.states, [&] { put(verdict_, time_ns, json); });
 }
 
 FlightLog::~FlightLog() { finish(); }

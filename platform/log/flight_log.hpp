@@ -51,6 +51,8 @@ class FlightLog final : public LogSink {
   void event(std::int64_t time_ns, Level level, std::string_view name, std::string_view text) noexcept;
   /// `json` is the message of `/result`.
   void result(std::int64_t time_ns, std::string_view json) noexcept;
+  /// `json` is the message of `/verdict`.
+  void verdict(std::int64_t time_ns, std::string_view json) noexcept;
   /// A message if any number has grown.
   void dropped(const RingDrops& drops) noexcept;
   /// The summary. Nothing may follow; more than once is harmless.
@@ -69,7 +71,7 @@ class FlightLog final : public LogSink {
   McapWriter writer_;
   LogViewer* viewer_{nullptr};
   std::uint16_t configuration_{}, world_{}, state_{}, pose_{}, tf_{}, path_{}, trajectory_{}, decision_{},
-      map_{}, failsafe_{}, events_{}, dropped_{}, result_{}, inputs_{};
+      map_{}, failsafe_{}, events_{}, dropped_{}, result_{}, verdict_{}, inputs_{};
   std::int64_t last_ns_{0};
   RingDrops drops_{};
   std::uint64_t told_messages_{0};

@@ -507,6 +507,11 @@ FlightStory story_of(const std::string& path, const WorldOf& world, bool live) {
   told.page.footer = fmt::format("From {}. Flown by roborun, commit {}, {}.", file.filename().string(),
                                  text_in(build, "commit"), text_in(build, "compiler"));
   Json story = teller.story();
+  if (told.end.has_verdict)
+    story["verdict"] = {
+        {"passed", told.end.passed},
+        {"complaints", told.end.complaints},
+        {"moment_s", std::isfinite(told.end.moment_s) ? Json(told.end.moment_s) : Json(nullptr)}};
   if (!teller.world().empty()) story["world"] = teller.world();
   told.page.live = live;
   if (live) story["live"] = true;

@@ -40,6 +40,20 @@ void take_result(const Json& json, LoggedEnd& end) {
   end.energy_kJ = number_or_unknown(json, "energy_kJ");
 }
 
+void take_verdict(const Json& json, LoggedEnd& end) {
+  const auto passed = json.find("passed");
+  const auto complaints = json.find("complaints");
+  const bool texts =
+      complaints != json.end() && complaints->is_array() &&
+      std::all_of(complaints->begin(), complaints->end(), [](const Json& text) { return text.is_string(); });
+  if (passed == json.end() || !passed->is_boolean() || !texts)
+    throw InputError("/verdict: must be an object with passed (true or false) and complaints (texts)");
+  end.has_verdict = true;
+  end.passed = passed->get<bool>();
+  end.complaints = complaints->get<std::vector<std::string>>();
+  end.moment_s = number_or_unknown(json, "moment_s");
+}
+
 }  // namespace
 
 void take(const log::Message& message, LoggedEnd& end) {
@@ -55,6 +69,8 @@ void take(const log::Message& message, LoggedEnd& end) {
     end.reason = text != event.end() && text->is_string() ? text->get<std::string>() : std::string();
   } else if (topic == "/result") {
     take_result(input::parse_json(message.data), end);
+  } else if (topic == "/verdict") {
+    take_verdict(input::parse_json(message.data), end);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "platform/log/mcap_reader.hpp"
 
@@ -14,8 +15,12 @@ inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 struct LoggedEnd {
   bool has_result{false};  ///< `/result` is there: a simulated flight that was logged to its end.
   bool reached{false}, collided{false};
-  std::string reason;   ///< Why it ended; of a log without a result its last event.
-  double recorded_s{};  ///< Until here there is something in the log.
+  bool has_verdict{false};              ///< `/verdict` is there: the flight of a scenario.
+  bool passed{false};                   ///< By that verdict.
+  std::vector<std::string> complaints;  ///< Of that verdict: what did not hold, one line each.
+  double moment_s{kUnknown};            ///< Of that verdict: the moment to look at.
+  std::string reason;                   ///< Why it ended; of a log without a result its last event.
+  double recorded_s{};                  ///< Until here there is something in the log.
   double time_s{kUnknown}, mean_mps{kUnknown}, distance_m{kUnknown}, energy_kJ{kUnknown};
   double closest_m{kUnknown};  ///< The nearest obstacle that the vehicle has seen at a decision.
   std::size_t decisions{};

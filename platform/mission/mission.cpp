@@ -303,6 +303,11 @@ void MissionRun::end_log(const char* reason) {
   if (recorder_) recorder_->finish(system_.map());
   log_->event(time_ns, log::Level::kInfo, "flight", reason);
   log_->result(time_ns, report::to_json(report_.result));
+  if (config_.judged) {
+    const LogVerdict verdict = config_.judged(report_);
+    log_->event(time_ns, verdict.passed ? log::Level::kInfo : log::Level::kError, "verdict", verdict.text);
+    log_->verdict(time_ns, verdict.json);
+  }
   log_->finish();
   report_.log_error = log_->error();
 }

@@ -15,6 +15,7 @@
 #include "platform/mission/autopilot_choice.hpp"
 #include "platform/mission/route.hpp"
 #include "platform/mission/setting_change.hpp"
+#include "platform/report/mission_result.hpp"
 #include "platform/sitl/aircraft/simulated_aircraft.hpp"
 #include "platform/sitl/fault/fault_line.hpp"
 #include "platform/sitl/world/world.hpp"
@@ -36,6 +37,7 @@ struct TimedFault {
   std::optional<governor::Phase> phase{};  ///< Time counts from the first moment of this phase; none: from 0.
   double at_s{0.0};
   double for_s{1e6};
+  double every_s{0.0};  ///< Begins again each so often; 0: once. Else more than for_s.
 };
 
 /// Goals that are given in flight, in the place of those that are not answered yet.
@@ -52,6 +54,13 @@ struct SlowDown {
   [[nodiscard]] double slower(MonotonicTime now) const noexcept {
     return seconds(now.time_since_epoch()) >= at_s ? factor : 1.0;
   }
+};
+
+/// What a log says of a flight that was to fulfil something.
+struct LogVerdict {
+  bool passed{};
+  std::string json;  ///< The message of `/verdict`.
+  std::string text;  ///< The same for people, one line.
 };
 
 /// When the judge ends a mission.
@@ -88,6 +97,8 @@ struct MissionConfig {
   log::LogViewer* viewer{nullptr};
   std::string
       source{};  ///< For the log: the files and options it is flown by, a JSON object that its maker reads; or empty.
+  /// For the log: what the one who judges the flight says of it when it has ended; empty: nobody does.
+  std::function<LogVerdict(const report::MissionReport&)> judged{};
   bool keep_known{false};  ///< report.known, at the height of the world's start.
   /// Called after every minor frame, may be empty: what a test measures.
   std::function<void(const FrameRecord&)> each_frame{};

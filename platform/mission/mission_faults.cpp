@@ -7,13 +7,6 @@ namespace roborun::mission {
 using sitl::Component;
 using sitl::FaultKind;
 
-namespace {
-
-constexpr double kStorm_mps = 18.0;
-constexpr double kSlowCpu = 4.0;
-
-}  // namespace
-
 std::vector<firmware_if::DepthCamera*> MissionFaults::connect(
     std::span<firmware_if::DepthCamera* const> cameras) {
   std::vector<firmware_if::DepthCamera*> all(cameras.begin(), cameras.end());
@@ -37,13 +30,13 @@ bool MissionFaults::advance(MonotonicTime now, governor::Phase phase) {
     if (begun_[i] || !from || seconds(now - *from) < f.at_s) continue;
     begun_[i] = true;
     any_ = true;
-    line_.inject(f.fault, from_seconds(f.for_s));
+    line_.inject(f.fault, from_seconds(f.for_s), from_seconds(f.every_s));
   }
   return any_ && !before;
 }
 
 Vector3 MissionFaults::mean_wind_W_mps() const {
-  return line_.of(Component::kWind) == FaultKind::kOn ? Vector3(0.0, kStorm_mps, 0.0)
+  return line_.of(Component::kWind) == FaultKind::kOn ? Vector3(0.0, line_.size(Component::kWind), 0.0)
                                                       : config_.simulator.wind.mean_W_mps;
 }
 
@@ -59,13 +52,15 @@ flight::Computer MissionFaults::computer(MonotonicTime now) const noexcept {
   const FaultKind cpu = line_.of(Component::kCpu);
   return {.flight_runs = cpu != FaultKind::kOff,
           .decision_runs = cpu != FaultKind::kOff && cpu != FaultKind::kStuck,
-          .slower = config_.slow_down.slower(now) * (cpu == FaultKind::kSlow ? kSlowCpu : 1.0)};
+          .slower =
+              config_.slow_down.slower(now) * (cpu == FaultKind::kSlow ? line_.size(Component::kCpu) : 1.0)};
 }
 
 Status FaultyPlanner::plan(const stages::PlanRequest& request, const stages::MapView& view,
                            core::StageBudget& budget, stages::PlanResult& result) noexcept {
   const FaultKind kind = line_.of(Component::kPlanner);
-  const bool silent = kind == FaultKind::kOff || (kind == FaultKind::kIntermittent && request.seed % 2 == 0);
+  const bool silent = kind == FaultKind::kOff ||
+                      (kind == FaultKind::kIntermittent && line_.loses(Component::kPlanner, 0, request.seed));
   if (!silent) return planner_.plan(request, view, budget, result);
   result = {};
   return Status::kBudgetSpent;

@@ -12,6 +12,7 @@
 #include "platform/input/text_file.hpp"
 #include "platform/input/toml_reader.hpp"
 #include "platform/mission/settings_file.hpp"
+#include "platform/mission/verdict.hpp"
 #include "platform/sitl/world/body_reader.hpp"
 #include "platform/sitl/world/generator.hpp"
 #include "platform/sitl/world/world_file.hpp"
@@ -36,6 +37,7 @@ class ScenarioReader {
  private:
   void read_head(Scenario& s) const;
   void read_faults(Scenario& s) const;
+  double size_of(const toml::node& node, const sitl::ComponentSpec& spec, sitl::FaultKind kind) const;
   void read_goals(Scenario& s) const;
   void read_expectation(Scenario& s) const;
   std::string text(const toml::node& node, std::string_view key) const {
@@ -128,6 +130,23 @@ void ScenarioReader::read_head(Scenario& s) const {
   if (const toml::node* node = head.get("answers")) s.config.flight.answers = truth(*node, "answers");
 }
 
+double ScenarioReader::size_of(const toml::node& node, const sitl::ComponentSpec& spec,
+                               sitl::FaultKind kind) const {
+  const sitl::FaultSize* row = sitl::size_of(spec.component, kind);
+  if (row == nullptr)
+    reader_.refuse(node, "size",
+                   fmt::format("must be left out: kind '{}' of {} has none",
+                               sitl::kFaultKindNames.at(static_cast<std::size_t>(kind)), spec.name));
+  if (kind == sitl::FaultKind::kSlow && spec.component != sitl::Component::kCpu)
+    return static_cast<double>(
+        reader_.whole(node, "size", static_cast<int>(row->least), static_cast<int>(row->most)));
+  const double value = reader_.number(node, "size");
+  if (!(value >= row->least && value <= row->most))
+    reader_.refuse(node, "size",
+                   fmt::format("must be a number from {} to {}: {}", row->least, row->most, row->unit));
+  return value;
+}
+
 void ScenarioReader::read_faults(Scenario& s) const {
   const toml::node* list = root_.get("fault");
   if (list == nullptr) return;
@@ -137,7 +156,8 @@ void ScenarioReader::read_faults(Scenario& s) const {
   for (const toml::node& node : *list->as_array()) {
     const toml::table* fault = node.as_table();
     if (fault == nullptr) reader_.refuse(node, "fault", "must be written as [[fault]]");
-    reader_.allow_keys(*fault, "[[fault]]", {"component", "kind", "instance", "phase", "at_s", "for_s"});
+    reader_.allow_keys(*fault, "[[fault]]",
+                       {"component", "kind", "size", "instance", "phase", "at_s", "for_s", "every_s"});
     TimedFault f;
     const sitl::ComponentSpec& spec =
         sitl::kComponents[choice(reader_.need(*fault, "component", "[[fault]]"), "component", names)];
@@ -150,13 +170,19 @@ void ScenarioReader::read_faults(Scenario& s) const {
     const auto of_all = std::find(sitl::kFaultKindNames.begin(), sitl::kFaultKindNames.end(), kinds[kind]);
     f.fault.component = spec.component;
     f.fault.kind = static_cast<sitl::FaultKind>(of_all - sitl::kFaultKindNames.begin());
+    if (const toml::node* size = fault->get("size")) f.fault.size = size_of(*size, spec, f.fault.kind);
     if (const toml::node* instance = fault->get("instance"))
       f.fault.instance = static_cast<int>(reader_.whole(*instance, "instance", 0, spec.instances - 1));
     if (const toml::node* phase = fault->get("phase"))
       f.phase = static_cast<governor::Phase>(
           choice(*phase, "phase", names_of<governor::Phase, governor::kPhaseCount>()));
     f.at_s = maybe(*fault, "at_s", 7200).value_or(0.0);
-    f.for_s = maybe(*fault, "for_s", 7200).value_or(f.for_s);
+    if (const toml::node* lasts = fault->get("for_s")) f.for_s = number(*lasts, "for_s", 0.001, 7200.0);
+    if (const toml::node* every = fault->get("every_s")) {
+      f.every_s = number(*every, "every_s", 0.001, 7200.0);
+      if (!(f.every_s > f.for_s))
+        reader_.refuse(*every, "every_s", "must be more than for_s, which says how long each burst lasts");
+    }
     if (s.config.faults.size() == sitl::FaultLine::kMost)
       reader_.refuse(node, "fault", fmt::format("must be at most {}", sitl::FaultLine::kMost));
     s.config.faults.push_back(f);
@@ -252,7 +278,11 @@ sitl::World world_of(const Scenario& s) {
 }
 
 report::MissionReport fly_scenario(const Scenario& s) {
-  report::MissionReport report = fly_mission(world_of(s), s.config, {});
+  MissionConfig config = s.config;
+  config.judged = [&s](const report::MissionReport& flown) {
+    return log_verdict(s.name, checks_of(s, flown), flown);
+  };
+  report::MissionReport report = fly_mission(world_of(s), config, {});
   report.result.env = s.name;
   return report;
 }

@@ -43,8 +43,8 @@ struct Scenario {
 /// Tables [scenario] about, world (relative to this file) or environment, vehicle (shipped, or a file
 /// relative to this one), seed, design, answers, cost_factor
 /// (of computing, against the paper's machine); those of a
-/// settings file (settings_file.hpp); any number of [[fault]] with component, kind, instance, phase, at_s,
-/// for_s; [[goal]] position_m, at_s: goals in the place of those not answered yet, those of one instant in order; [[body]] as in a world file (body_reader.hpp); [expect] with the fields above. Throws
+/// settings file (settings_file.hpp); any number of [[fault]] with component, kind, size (sitl::kSizes),
+/// instance, phase, at_s, for_s, every_s; [[goal]] position_m, at_s: goals in the place of those not answered yet, those of one instant in order; [[body]] as in a world file (body_reader.hpp); [expect] with the fields above. Throws
 /// InputError with file, line, key and what would be right.
 [[nodiscard]] Scenario load_scenario(const std::string& path);
 /// Whether a TOML file has a table that only scenarios have ([scenario], [expect], [[fault]]). Throws InputError for what
@@ -52,7 +52,7 @@ struct Scenario {
 [[nodiscard]] bool is_scenario(const std::string& path);
 /// Where it is flown, bodies included. Throws InputError for a file that is no world.
 [[nodiscard]] sitl::World world_of(const Scenario& scenario);
-/// Flies it. Throws InputError for a world that cannot be flown.
+/// Flies it; its log says whether it passed (verdict.hpp). Throws InputError for a world that cannot be flown.
 [[nodiscard]] report::MissionReport fly_scenario(const Scenario& scenario);
 
 }  // namespace roborun::mission

@@ -150,11 +150,15 @@ std::string to_text(const Check& c) {
                      c.why.empty() ? "" : ": ", c.why);
 }
 
-std::vector<std::string> complaints_of(const Scenario& scenario, const report::MissionReport& report) {
+std::vector<std::string> complaints_of(const std::vector<Check>& checks) {
   std::vector<std::string> texts;
-  for (const Check& c : checks_of(scenario, report))
+  for (const Check& c : checks)
     if (!c.passed) texts.push_back(to_text(c));
   return texts;
+}
+
+std::vector<std::string> complaints_of(const Scenario& scenario, const report::MissionReport& report) {
+  return complaints_of(checks_of(scenario, report));
 }
 
 double moment_of(const std::vector<Check>& checks, const report::MissionReport& report) {
@@ -166,6 +170,28 @@ double moment_of(const std::vector<Check>& checks, const report::MissionReport& 
   at_s = std::clamp(at_s, report.decisions.front().time_s, report.decisions.back().time_s);
   return std::ceil(100.0 * at_s - 1e-6) /
          100.0;  // or it would be printed as a moment before the first decision
+}
+
+nlohmann::json to_json(const Check& c) {
+  nlohmann::json j{{"condition", c.condition}, {"passed", c.passed}, {"value", c.value}, {"limit", c.limit}};
+  j["at_s"] = c.at_s >= 0.0 ? nlohmann::json(c.at_s) : nlohmann::json(nullptr);
+  if (!c.why.empty()) j["why"] = c.why;
+  return j;
+}
+
+LogVerdict log_verdict(const std::string& scenario, const std::vector<Check>& checks,
+                       const report::MissionReport& report) {
+  const std::vector<std::string> complaints = complaints_of(checks);
+  nlohmann::json all = nlohmann::json::array();
+  for (const Check& c : checks) all.push_back(to_json(c));
+  nlohmann::json j{{"scenario", scenario},
+                   {"passed", complaints.empty()},
+                   {"complaints", complaints},
+                   {"checks", std::move(all)}};
+  if (!complaints.empty()) j["moment_s"] = moment_of(checks, report);
+  return {complaints.empty(), j.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace),
+          complaints.empty() ? fmt::format("scenario {} passed", scenario)
+                             : fmt::format("scenario {} FAILED: {}", scenario, fmt::join(complaints, "; "))};
 }
 
 }  // namespace roborun::mission

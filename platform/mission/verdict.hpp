@@ -1,6 +1,7 @@
 /// What a scenario asks of its flight, one by one, and what came of each.
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -24,10 +25,17 @@ struct Check {
 /// "outcome: landed at 11.32 s, must be reached_goal: the failsafe chose land at 7.88 s (mission; gnss)".
 [[nodiscard]] std::string to_text(const Check& check);
 /// The texts of those that did not pass; empty: the scenario passed.
+[[nodiscard]] std::vector<std::string> complaints_of(const std::vector<Check>& checks);
 [[nodiscard]] std::vector<std::string> complaints_of(const Scenario& scenario,
                                                      const report::MissionReport& report);
 /// The moment that a failed flight should be looked at: that of the first action after which it could not pass any more, as
 /// far as the checks tell, and otherwise the end. Within the time of its decisions, rounded up to 0.01 s; 0 without any.
 [[nodiscard]] double moment_of(const std::vector<Check>& checks, const report::MissionReport& report);
+
+/// condition, passed, value, limit, at_s (null: no moment), and why if there is one.
+[[nodiscard]] nlohmann::json to_json(const Check& check);
+/// {scenario, passed, complaints, checks, moment_s}, moment_s if it failed.
+[[nodiscard]] LogVerdict log_verdict(const std::string& scenario, const std::vector<Check>& checks,
+                                     const report::MissionReport& report);
 
 }  // namespace roborun::mission

@@ -21,6 +21,7 @@ struct FlightPage {
   ///   world {height_m, circles [[x, y, radius]], rings [[[x, y], ...]]}: what stands at that height; may be missing,
   ///   camera [{time_s, camera, name, wide, high, range_m, pixels}]: ascending for each camera (from 0); pixels as letters, row by
   ///     row: page/flight_cameras.js,
+  ///   verdict {passed, complaints [text], moment_s or null}: of the flight of a scenario; may be missing,
   ///   live: true if the page shall ask its server for what follows; may be missing,
   ///   failsafe [{time_s, action, phase, conditions [], sensor}], events [{time_s, text}].
   std::string story;

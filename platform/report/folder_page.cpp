@@ -15,8 +15,8 @@ namespace roborun::report {
 namespace {
 
 // Signs beside colours: a verdict is read without seeing colours.
-constexpr std::array<const char*, 3> kSign{"\u2717 failed", "? unknown", "\u2713 reached"};
-constexpr std::array<const char*, 3> kClass{"bad", "quiet", "good"};
+constexpr std::array<const char*, 4> kSign{"\u2717 failed", "? unknown", "\u2713 reached", "\u2713 passed"};
+constexpr std::array<const char*, 4> kClass{"bad", "quiet", "good", "good"};
 
 constexpr const char* kStyle =
     R"(td,th{border-bottom:1px solid var(--line);padding:4px 14px 4px 0}
@@ -45,10 +45,13 @@ std::string row_of(const FolderRow& row) {
       row.page.empty() ? xml_escape(row.name)
                        : fmt::format("<a href=\"{}\">{}</a>", address_of(row.page), xml_escape(row.name));
   const std::string note = row.note.empty() ? "" : fmt::format("<small>{}</small>", xml_escape(row.note));
+  std::string complaints;
+  for (const std::string& line : row.complaints)
+    complaints += fmt::format("<small>{}</small>", xml_escape(line));
   return fmt::format(
-      "<tr><td>{}{}</td><td class=\"{}\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", name,
-      note, kClass[verdict], kSign[verdict], xml_escape(row.reason), number(row.time_s), number(row.mean_mps),
-      number(row.closest_m));
+      "<tr><td>{}{}</td><td class=\"{}\">{}</td><td>{}{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", name,
+      note, kClass[verdict], kSign[verdict], xml_escape(row.reason), complaints, number(row.time_s),
+      number(row.mean_mps), number(row.closest_m));
 }
 
 }  // namespace
@@ -58,7 +61,7 @@ std::string folder_page_html(const std::string& title, std::vector<FolderRow> ro
   std::stable_sort(rows.begin(), rows.end(), [](const FolderRow& a, const FolderRow& b) {
     return std::tie(a.verdict, a.name) < std::tie(b.verdict, b.name);
   });
-  std::array<std::size_t, 3> count{};
+  std::array<std::size_t, 4> count{};
   for (const FolderRow& row : rows) ++count[static_cast<std::size_t>(row.verdict)];
   std::string html = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
@@ -66,11 +69,12 @@ std::string folder_page_html(const std::string& title, std::vector<FolderRow> ro
       "'unsafe-inline'\">"
       "<meta name=\"viewport\" "
       "content=\"width=device-width\"><title>{0}</title>\n<style>\n{1}{2}</style></head>"
-      "<body>\n<h1>{0}</h1>\n<p>{3} flights: {4} failed, {5} unknown, {6} reached the goal.</p>\n"
+      "<body>\n<h1>{0}</h1>\n<p>{3} flights: {4} failed, {5} unknown, {6} reached the goal{7}.</p>\n"
       "<table><thead><tr><th scope=\"col\">flight</th><th scope=\"col\">verdict</th>"
       "<th scope=\"col\">why it ended</th><th scope=\"col\">time s</th><th scope=\"col\">mean m/s</th>"
       "<th scope=\"col\">nearest obstacle m</th></tr></thead><tbody>\n",
-      xml_escape(title), kPageStyle, kStyle, rows.size(), count[0], count[1], count[2]);
+      xml_escape(title), kPageStyle, kStyle, rows.size(), count[0], count[1], count[2],
+      count[3] == 0 ? std::string() : fmt::format(", {} passed as their scenarios ask", count[3]));
   for (const FolderRow& row : rows) html += row_of(row);
   html +=
       "</tbody></table>\n<p class=\"quiet\">Nearest obstacle: the nearest that the vehicle has seen when it "

@@ -71,12 +71,27 @@ class Page {
     this.charts = charts_of(story, this.axis, choose);
     this.choose = choose;
     Object.assign($('time'), { min: this.axis.from, max: this.axis.until });
+    this.show_verdict();
     this.list_facts();
     $('note').textContent = story.notes.join('\n');
     this.list_events();
     this.listen();
     this.t = this.axis.from;
     this.repaint();
+  }
+  /** Of a scenario: whether it passed, and all that did not hold. A sign beside the colour: it is read without seeing colours. */
+  show_verdict() {
+    const verdict = this.story.verdict;
+    if (!verdict) return;
+    const lines = [verdict.passed ? '\u2713 The scenario passed.' : '\u2717 The scenario FAILED:', ...verdict.complaints];
+    $('verdict').className = verdict.passed ? 'good' : 'bad';
+    $('verdict').replaceChildren(...lines.map(textContent => Object.assign(document.createElement('p'), { textContent })));
+    if (verdict.moment_s !== null) {
+      const show = Object.assign(document.createElement('button'), { type: 'button', textContent: `Show ${verdict.moment_s.toFixed(2)} s` });
+      show.addEventListener('click', () => this.go(verdict.moment_s));
+      $('verdict').append(show);
+    }
+    $('verdict').hidden = false;
   }
   list_facts() {
     $('facts').replaceChildren(...this.story.facts.map(([name, value]) => {

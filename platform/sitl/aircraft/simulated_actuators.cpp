@@ -46,15 +46,16 @@ void SimulatedActuators::break_lines(MonotonicTime now) noexcept {
     bus_off_ = !bus_off_;
     bus_off_ ? port_.go_bus_off() : port_.recover();
   }
-  bus_.set_faults({.loss_ratio = can == FaultKind::kIntermittent ? 0.5 : 0.0,
-                   .corrupt_ratio = can == FaultKind::kGarbage ? 0.5 : 0.0});
+  const double share = faults_->size(Component::kCan);
+  bus_.set_faults({.loss_ratio = can == FaultKind::kIntermittent ? share : 0.0,
+                   .corrupt_ratio = can == FaultKind::kGarbage ? share : 0.0});
 }
 
 double SimulatedActuators::break_battery(double charge_ratio) noexcept {
   const FaultKind kind = faults_->of(Component::kBattery);
   power_module_.set_silent(kind == FaultKind::kOff);
   if (kind == FaultKind::kNone) sound_charge_ratio_ = charge_ratio;
-  if (kind == FaultKind::kWrong) return 0.05;
+  if (kind == FaultKind::kWrong) return faults_->size(Component::kBattery);
   if (kind == FaultKind::kGarbage) return std::numeric_limits<double>::quiet_NaN();
   return sound_charge_ratio_;
 }
@@ -73,11 +74,11 @@ double SimulatedActuators::break_esc(std::size_t i, double ratio, MonotonicTime 
     case FaultKind::kGarbage:
       return ratio > 0.0 ? core::CounterRng(ticks, i).uniform() : 0.0;
     case FaultKind::kWrong:
-      return 0.85 * ratio;
+      return faults_->size(Component::kEsc, instance) * ratio;
     case FaultKind::kSlow:
       return turning_[i] + 0.02 * (ratio - turning_[i]);
     case FaultKind::kIntermittent:
-      return core::CounterRng(ticks, 8 + i).below(2) == 0 ? 0.0 : ratio;
+      return faults_->loses(Component::kEsc, instance, ticks) ? 0.0 : ratio;
     default:
       return ratio;
   }

@@ -107,7 +107,9 @@ class SimulatedPlant {
   [[nodiscard]] bool hears_operator() const noexcept {
     const FaultKind kind = faults_ != nullptr ? faults_->of(Component::kLink) : FaultKind::kNone;
     return kind == FaultKind::kNone ||
-           (kind == FaultKind::kIntermittent && now_.time_since_epoch() / minor_frame_ % 2 == 0);
+           (kind == FaultKind::kIntermittent &&
+            !faults_->loses(Component::kLink, 0,
+                            static_cast<std::uint64_t>(now_.time_since_epoch() / minor_frame_)));
   }
 
  private:

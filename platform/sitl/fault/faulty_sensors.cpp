@@ -9,11 +9,6 @@
 namespace roborun::sitl {
 namespace {
 
-constexpr Nanos kImuDelay{50'000'000};
-constexpr Nanos kDelay{400'000'000};
-constexpr Nanos kClockShift{200'000'000};
-constexpr std::uint32_t kSlow = 10;
-constexpr double kJump_m = 2.0;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// In [-1e6, 1e6], every third one NaN: a function of the sequence alone.
@@ -21,8 +16,9 @@ double nonsense(std::uint64_t sequence, std::uint64_t field) noexcept {
   core::CounterRng rng(sequence, field);
   return rng.below(3) == 0 ? kNaN : rng.uniform(-1e6, 1e6);
 }
-bool lost(std::uint64_t sequence, std::uint64_t stream) noexcept {
-  return core::CounterRng(sequence, stream).below(2) == 0;
+/// For kSlow.
+bool comes(double one_in, std::uint64_t sequence) noexcept {
+  return sequence % static_cast<std::uint64_t>(one_in) == 0;
 }
 
 void garble(firmware_if::ImuSample& s) noexcept {
@@ -46,17 +42,11 @@ void garble(firmware_if::OdometrySample& s) noexcept {
   }
 }
 
-void bend(firmware_if::ImuSample& s) noexcept { s.angular_rate_B_radps[0] += 0.5; }
-void bend(firmware_if::GnssFix& f) noexcept { f.p_WB_m[1] += 30.0; }
-void bend(firmware_if::BarometerSample& s) noexcept { s.altitude_m += 30.0; }
-
-template <typename Sample>
-void bend(Sample&) noexcept {}
-
-template <typename Sample>
-void jump(Sample&) noexcept {}
-void jump(firmware_if::GnssFix& f) noexcept { f.p_WB_m[1] += kJump_m; }
-void jump(firmware_if::OdometrySample& s) noexcept { s.p_OB_m[1] += kJump_m; }
+/// By so much in its own unit: wrong, jump, drift.
+void shift(firmware_if::ImuSample& s, double by) noexcept { s.angular_rate_B_radps[0] += by; }
+void shift(firmware_if::GnssFix& f, double by) noexcept { f.p_WB_m[1] += by; }
+void shift(firmware_if::BarometerSample& s, double by) noexcept { s.altitude_m += by; }
+void shift(firmware_if::OdometrySample& s, double by) noexcept { s.p_OB_m[1] += by; }
 
 template <typename Sample>
 void begin_anew(Sample&) noexcept {}
@@ -108,12 +98,12 @@ void turn(const firmware_if::DepthFrame& frame, std::vector<float>& depth_m) noe
 }
 
 /// Contrast falls by 95 % over the visibility (Koschmieder): so does the share of pixels that a stereo camera can match.
-void veil(std::uint64_t number, const firmware_if::DepthFrame& frame, std::vector<float>& depth_m) noexcept {
-  constexpr double kVisibility_m = 10.0;
+void veil(double visibility_m, std::uint64_t number, const firmware_if::DepthFrame& frame,
+          std::vector<float>& depth_m) noexcept {
   core::CounterRng rng(number, 42);
   for (float& d : depth_m) {
     const auto z_m = static_cast<double>(std::fmin(d, frame.range_m));
-    if (!(rng.uniform() < core::exp(-3.0 * z_m / kVisibility_m))) d = kNoValue;
+    if (!(rng.uniform() < core::exp(-3.0 * z_m / visibility_m))) d = kNoValue;
   }
 }
 
@@ -135,22 +125,24 @@ void wet(std::uint64_t number, const firmware_if::DepthFrame& frame, std::vector
 }
 
 template <typename Sample>
-void shift_clock(FaultKind kind, Sample& s) noexcept {
-  if (kind == FaultKind::kWrong) s.stamp += kClockShift;
-  if (kind == FaultKind::kDelayed) s.stamp -= kClockShift;
+void shift_clock(const FaultLine& faults, Sample& s) noexcept {
+  const Nanos shift = from_seconds(faults.size(Component::kClock));
+  const FaultKind kind = faults.of(Component::kClock);
+  if (kind == FaultKind::kWrong) s.stamp += shift;
+  if (kind == FaultKind::kDelayed) s.stamp -= shift;
 }
 
 }  // namespace
 
 template <typename Sample>
-Status FaultySensors::read(Component component, Nanos delay, Channel<Sample>& channel,
-                           Sample& sample) noexcept {
+Status FaultySensors::read(Component component, Channel<Sample>& channel, Sample& sample) noexcept {
   const FaultKind kind = faults_ != nullptr ? faults_->of(component) : FaultKind::kNone;
   if (kind == FaultKind::kNone) {
     const Status status = sensors_.read(sample);
     if (status == Status::kOk) channel.good = sample;
     return status;
   }
+  const double size = faults_->size(component);
   // At most what a ring holds.
   while (sensors_.read(sample) == Status::kOk) {
     switch (kind) {
@@ -165,22 +157,23 @@ Status FaultySensors::read(Component component, Nanos delay, Channel<Sample>& ch
         garble(sample);
         return Status::kOk;
       case FaultKind::kWrong:
-        bend(sample);
-        return Status::kOk;
       case FaultKind::kJump:
-        jump(sample);
+        shift(sample, size);
+        return Status::kOk;
+      case FaultKind::kDrift:
+        shift(sample, size * seconds(faults_->age(component)));
         return Status::kOk;
       case FaultKind::kReset:
         begin_anew(sample);
         return Status::kOk;
       case FaultKind::kSlow:
-        if (sample.sequence % kSlow == 0) return Status::kOk;
+        if (comes(size, sample.sequence)) return Status::kOk;
         break;
       case FaultKind::kIntermittent:
-        if (!lost(sample.sequence, static_cast<std::uint64_t>(component))) return Status::kOk;
+        if (!faults_->loses(component, 0, sample.sequence)) return Status::kOk;
         break;
       case FaultKind::kDelayed:
-        channel.late.push(sample, now_ + delay);
+        channel.late.push(sample, now_ + from_seconds(size));
         break;
       default:
         break;  // off
@@ -190,36 +183,37 @@ Status FaultySensors::read(Component component, Nanos delay, Channel<Sample>& ch
 }
 
 Status FaultySensors::read(firmware_if::ImuSample& sample) noexcept {
-  return read(Component::kImu, kImuDelay, imu_, sample);
+  return read(Component::kImu, imu_, sample);
 }
 
 Status FaultySensors::read(firmware_if::GnssFix& fix) noexcept {
-  const Status status = read(Component::kGnss, kDelay, gnss_, fix);
-  if (status == Status::kOk && faults_ != nullptr) shift_clock(faults_->of(Component::kClock), fix);
+  const Status status = read(Component::kGnss, gnss_, fix);
+  if (status == Status::kOk && faults_ != nullptr) shift_clock(*faults_, fix);
   return status;
 }
 
 Status FaultySensors::read(firmware_if::BarometerSample& sample) noexcept {
-  return read(Component::kBarometer, kDelay, barometer_, sample);
+  return read(Component::kBarometer, barometer_, sample);
 }
 
 Status FaultySensors::read(firmware_if::OdometrySample& sample) noexcept {
-  const Status status = read(Component::kOdometry, kDelay, odometry_, sample);
-  if (status == Status::kOk && faults_ != nullptr) shift_clock(faults_->of(Component::kClock), sample);
+  const Status status = read(Component::kOdometry, odometry_, sample);
+  if (status == Status::kOk && faults_ != nullptr) shift_clock(*faults_, sample);
   return status;
 }
 
 Status FaultyDepthCamera::read(firmware_if::DepthFrame& frame) noexcept {
   const FaultKind kind = faults_.of(Component::kDepth, instance_);
+  const double size = faults_.size(Component::kDepth, instance_);
   if (kind == FaultKind::kDelayed && waiting_) {
-    if (faults_.now() - late_.stamp < kDelay) return Status::kNotReady;
+    if (faults_.now() - late_.stamp < from_seconds(size)) return Status::kNotReady;
     waiting_ = false;
     frame = late_;
     return Status::kOk;
   }
   const Status status = camera_.read(frame);
   if (status != Status::kOk) return status;
-  shift_clock(faults_.of(Component::kClock), frame);
+  shift_clock(faults_, frame);
   const auto number = std::uint64_t{frame.sequence} * 8 + static_cast<std::uint64_t>(instance_);
   if (kind == FaultKind::kNone) {
     good_m_.assign(frame.depth_m.begin(), frame.depth_m.end());
@@ -232,10 +226,11 @@ Status FaultyDepthCamera::read(firmware_if::DepthFrame& frame) noexcept {
       return Status::kOk;
     case FaultKind::kGarbage:
       for (std::size_t i = 0; i < bent_m_.size(); ++i)
-        bent_m_[i] = lost(number, i) ? std::numeric_limits<float>::quiet_NaN() : -1.0F;
+        bent_m_[i] =
+            core::CounterRng(number, i).below(2) == 0 ? std::numeric_limits<float>::quiet_NaN() : -1.0F;
       break;
     case FaultKind::kWrong:
-      for (float& depth_m : bent_m_) depth_m *= 0.5F;
+      for (float& depth_m : bent_m_) depth_m *= static_cast<float>(size);
       break;
     case FaultKind::kCovered:
       cover(number, frame, bent_m_);
@@ -244,15 +239,15 @@ Status FaultyDepthCamera::read(firmware_if::DepthFrame& frame) noexcept {
       turn(frame, bent_m_);
       break;
     case FaultKind::kFog:
-      veil(number, frame, bent_m_);
+      veil(size, number, frame, bent_m_);
       break;
     case FaultKind::kRain:
       wet(number, frame, bent_m_);
       break;
     case FaultKind::kSlow:
-      return frame.sequence % kSlow == 0 ? Status::kOk : Status::kNotReady;
+      return comes(size, frame.sequence) ? Status::kOk : Status::kNotReady;
     case FaultKind::kIntermittent:
-      return lost(number, 9) ? Status::kNotReady : Status::kOk;
+      return faults_.loses(Component::kDepth, instance_, frame.sequence) ? Status::kNotReady : Status::kOk;
     case FaultKind::kDelayed:
       late_ = frame;
       late_.depth_m = bent_m_;

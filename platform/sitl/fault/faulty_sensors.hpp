@@ -38,8 +38,7 @@ class FaultySensors final : public firmware_if::Imu,
     DelayLine<Sample, 64> late{};
   };
   template <typename Sample>
-  [[nodiscard]] Status read(Component component, Nanos delay, Channel<Sample>& channel,
-                            Sample& sample) noexcept;
+  [[nodiscard]] Status read(Component component, Channel<Sample>& channel, Sample& sample) noexcept;
 
   NavigationSensors sensors_;
   const FaultLine* faults_{nullptr};

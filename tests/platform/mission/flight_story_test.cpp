@@ -62,6 +62,16 @@ TEST(FlightStory, HoldsWhatTheLogHolds) {
   EXPECT_EQ(s["events"][1]["text"], "the flight ended: landed <at> the end");
 }
 
+TEST(FlightStory, SaysWhetherTheScenarioPassed) {
+  const FlightStory told = story_of(sample(3.0));
+  EXPECT_TRUE(told.end.has_verdict);
+  EXPECT_FALSE(told.end.passed);
+  EXPECT_EQ(json::parse(told.page.story)["verdict"],
+            (json{{"passed", false},
+                  {"complaints", {"outcome: landed, must be <reached_goal>"}},
+                  {"moment_s", 2.5}}));
+}
+
 TEST(FlightStory, HoldsEveryCellOfTheMap) {
   const json s = story_in(sample(3.0));
   ASSERT_EQ(s["map"].size(), 4U);
@@ -195,6 +205,8 @@ TEST(FlightStory, RefusesWhatIsNotAsDocumented) {
       {"/world", {R"({"height_m":1,"circles":[[1,2]],"rings":[]})", "circles: must be a list of shapes"}},
       {"/world", {R"({"height_m":1,"circles":[],"rings":[[[1,"a"]]]})", "rings: must be a list of shapes"}},
       {"/world", {R"({"circles":[],"rings":[]})", "/world at 1.500 s: height_m: must be a number"}},
+      {"/verdict", {R"({"passed":1,"complaints":[]})", "/verdict: must be an object with passed"}},
+      {"/verdict", {R"({"passed":true,"complaints":[1]})", "complaints (texts)"}},
       {"/trajectory", {R"({"poses":[{"position":{"x":0,"y":0}}]})", "z: must be a number"}}};
   for (const auto& [topic, one] : cases) {
     try {

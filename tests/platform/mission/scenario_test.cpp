@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "platform/input/input_error.hpp"
+#include "platform/log/flight_log.hpp"
+#include "platform/log/mcap_reader.hpp"
+#include "platform/mission/logged_end.hpp"
 #include "platform/mission/scenario_file.hpp"
 #include "platform/mission/scenario_matrix.hpp"
 #include "platform/mission/verdict.hpp"
@@ -48,6 +52,20 @@ TEST(ScenarioFile, ReadsEveryTable) {
   EXPECT_EQ(s.expect.landing_site_known, true);
 }
 
+TEST(ScenarioFile, AFaultSaysHowMuchAndHowOften) {
+  const Scenario s = load_scenario(test::scratch_file(
+      "bursts.toml", kHead +
+                         "[[fault]]\ncomponent = \"can\"\nkind = \"intermittent\"\nsize = 0.1\nfor_s = 0.05\n"
+                         "every_s = 1\n[[fault]]\ncomponent = \"gnss\"\nkind = \"drift\"\n" +
+                         kTail));
+  ASSERT_EQ(s.config.faults.size(), 2U);
+  EXPECT_EQ(s.config.faults[0].fault.size, 0.1);
+  EXPECT_EQ(s.config.faults[0].for_s, 0.05);
+  EXPECT_EQ(s.config.faults[0].every_s, 1.0);
+  EXPECT_FALSE(s.config.faults[1].fault.size.has_value());
+  EXPECT_EQ(s.config.faults[1].every_s, 0.0);
+}
+
 TEST(ScenarioFile, RefusesWithFileLineKeyAndWhatWouldBeRight) {
   const std::string fault = kHead + "[[fault]]\n";
   const std::pair<std::string, const char*> cases[] = {
@@ -71,6 +89,19 @@ TEST(ScenarioFile, RefusesWithFileLineKeyAndWhatWouldBeRight) {
        ":7: phase: 'cruise' must be one of ground, take_off, mission"},
       {fault + "component = \"esc\"\nkind = \"off\"\nat_s = -1\n" + kTail,
        ":7: at_s: must be a number from 0"},
+      {fault + "component = \"can\"\nkind = \"off\"\nsize = 0.1\n" + kTail,
+       ":7: size: must be left out: kind 'off' of can has none"},
+      {fault + "component = \"can\"\nkind = \"intermittent\"\nsize = 10\n" + kTail,
+       ":7: size: must be a number from 0.001 to 1: share of frames lost"},
+      {fault + "component = \"gnss\"\nkind = \"drift\"\nsize = nan\n" + kTail, ":7: size: must be a finite"},
+      {fault + "component = \"gnss\"\nkind = \"slow\"\nsize = 2.5\n" + kTail,
+       ":7: size: must be a whole number from 2 to 1000"},
+      {fault + "component = \"can\"\nkind = \"off\"\nevery_s = 1\n" + kTail,
+       ":7: every_s: must be more than for_s"},
+      {fault + "component = \"can\"\nkind = \"off\"\nfor_s = 1\nevery_s = 1\n" + kTail,
+       ":8: every_s: must be more than for_s"},
+      {fault + "component = \"can\"\nkind = \"off\"\nfor_s = 0\n" + kTail,
+       ":7: for_s: must be a number from 0.001 to 7200"},
       {fault + "kind = \"off\"\n" + kTail, ":4: component: missing in [[fault]]"},
       {kHead + "[[body]]\nradius = -1\npath = [[0, 0, 0]]\n" + kTail, ":5: radius: must be a number from 0"},
       {kHead + "[fence]\nkeep_in = [{ polygon = [] }]\n" + kTail,
@@ -232,9 +263,40 @@ TEST(Verdict, OfACollisionSaysWhatWasHit) {
   plan.faults = {"esc:off"};
   plan.environments = {world};
   plan.seeds = {1};
-  const report::MissionReport r = fly_scenario(cells_of(plan).front());
+  Scenario s = cells_of(plan).front();
+  s.config.log = test::scratch("failed.mcap");
+  const report::MissionReport r = fly_scenario(s);
   ASSERT_EQ(r.result.reason, "collision") << "four motors, no spare";
   EXPECT_TRUE(r.safety.end.starts_with("it flew into the ground; at (")) << r.safety.end;
+
+  // Its log says the same to who opens it, and to every viewer of events.
+  const std::vector<std::string> complaints = complaints_of(s, r);
+  const LoggedEnd end = end_of(s.config.log);
+  ASSERT_TRUE(end.has_verdict);
+  EXPECT_FALSE(end.passed);
+  EXPECT_EQ(end.complaints, complaints);
+  EXPECT_EQ(end.moment_s, moment_of(checks_of(s, r), r));
+  std::string last_event;
+  log::McapReader reader(s.config.log);
+  for (log::Message m; reader.next(m);)
+    if (m.channel->topic == "/events") last_event = m.data;
+  const nlohmann::json event = nlohmann::json::parse(last_event);
+  EXPECT_EQ(event["level"], static_cast<int>(log::Level::kError));
+  EXPECT_EQ(event["message"], "scenario " + s.name + " FAILED: " + complaints.front());
+}
+
+TEST(Verdict, OfAFlightThatPassedIsInItsLogToo) {
+  Scenario s = asks_for("landed");
+  s.name = "quiet";
+  const LogVerdict verdict = log_verdict(s.name, checks_of(s, landing()), landing());
+  EXPECT_TRUE(verdict.passed);
+  EXPECT_EQ(verdict.text, "scenario quiet passed");
+  const nlohmann::json j = nlohmann::json::parse(verdict.json);
+  EXPECT_EQ(j["scenario"], "quiet");
+  EXPECT_EQ(j["passed"], true);
+  EXPECT_TRUE(j["complaints"].empty());
+  EXPECT_EQ(j["checks"].size(), checks_of(s, landing()).size());
+  EXPECT_FALSE(j.contains("moment_s"));
 }
 
 TEST(ScenarioFile, IsToldFromOtherToml) {

@@ -43,6 +43,19 @@ TEST(FolderPage, HoldsWhateverANameIs) {
   EXPECT_EQ(html.find("nan"), std::string::npos);
 }
 
+TEST(FolderPage, SaysWhatAScenarioDidNotGet) {
+  FolderRow failed = row("bad", Verdict::kFailed);
+  failed.complaints = {"outcome: landed at 12.50 s, must be <holding>", "touchdown_mps: 3.00 m/s"};
+  const std::string html = folder_page_html("failed", {row("good", Verdict::kPassed), failed}, {});
+  EXPECT_NE(html.find("2 flights: 1 failed, 0 unknown, 0 reached the goal, 1 passed as their scenarios ask"),
+            std::string::npos);
+  EXPECT_NE(html.find("<small>outcome: landed at 12.50 s, must be &lt;holding&gt;</small>"),
+            std::string::npos);
+  EXPECT_NE(html.find("<small>touchdown_mps: 3.00 m/s</small>"), std::string::npos);
+  EXPECT_LT(html.find("bad.html"), html.find("good.html"));
+  EXPECT_NE(html.find("passed</td>"), std::string::npos);
+}
+
 TEST(FolderPage, AsksForNothing) {
   const std::string html = folder_page_html("flights", {row("a", Verdict::kReached)}, {"b"});
   ASSERT_NE(html.find("<table>"), std::string::npos);

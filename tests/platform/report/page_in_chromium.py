@@ -41,6 +41,12 @@ def look_at_static(page, folder, name):
 
 def use(page, folder):
     check("there are decisions", page.value("page.story.decision.time_s.length") > 3)
+    check("the verdict of the scenario stands first", page.value("""(() => { const v = document.getElementById('verdict');
+        return !v.hidden && v.className === 'bad' && v.textContent.includes('FAILED') && v.textContent.includes('must be <reached_goal>') &&
+        v.getBoundingClientRect().bottom < document.getElementById('facts').getBoundingClientRect().top + 1; })()"""))
+    page.value("document.querySelector('#verdict button').click()")
+    check("its button goes to the moment", page.value(f"Math.abs({TIME} - 2.5) < 0.02"))
+    page.key("Home")
     check("there are charts", page.value("document.querySelectorAll('#charts canvas').length") >= 4)
     check("there are two cameras, and the true world", page.value("document.querySelectorAll('#cameras canvas').length === 2 && page.story.world.circles.length === 1"))
     first = [page.value(e) for e in (PICTURE, CHARTS, WHY, CAMERAS)]

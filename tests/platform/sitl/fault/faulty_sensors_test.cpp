@@ -150,6 +150,70 @@ TEST(FaultySensors, AClockThatRunsAheadShiftsOnlyTheStamps) {
   EXPECT_EQ(got[3].p_WB_m, wanted[3].p_WB_m);
 }
 
+TEST(FaultySensors, ADriftGoesAwayFromTheTruthAtItsRate) {
+  Bench bench;
+  bench.line.inject({.component = Component::kGnss, .kind = FaultKind::kDrift, .size = 0.25},
+                    from_seconds(3.0));
+  const auto [got, wanted] = bench.second<firmware_if::GnssFix>();
+  ASSERT_EQ(got.size(), wanted.size());
+  ASSERT_GT(got.size(), 5U);
+  const auto off_m = [&, &got = got, &wanted = wanted](std::size_t i) {
+    return got[i].p_WB_m[1] - wanted[i].p_WB_m[1];
+  };
+  const double apart_s = seconds(got.back().stamp - got.front().stamp);
+  ASSERT_GT(apart_s, 0.5);
+  EXPECT_NEAR(off_m(got.size() - 1) - off_m(0), 0.25 * apart_s, 0.25 * 2e-3 * 3);
+  EXPECT_GT(off_m(0), 0.0);
+}
+
+TEST(FaultLine, LosesTheShareThatItIsToldAndOtherOnesWithAnotherSeed) {
+  constexpr std::uint64_t kNumbers = 20000;
+  FaultLine sut{1}, same{1}, other{2};
+  for (FaultLine* line : {&sut, &same, &other})
+    line->inject({.component = Component::kGnss, .kind = FaultKind::kIntermittent, .size = 0.1}, Nanos{1000});
+  std::uint64_t lost = 0, apart = 0;
+  for (std::uint64_t n = 0; n < kNumbers; ++n) {
+    lost += sut.loses(Component::kGnss, 0, n) ? 1U : 0U;
+    apart += sut.loses(Component::kGnss, 0, n) != other.loses(Component::kGnss, 0, n) ? 1U : 0U;
+    ASSERT_EQ(sut.loses(Component::kGnss, 0, n), same.loses(Component::kGnss, 0, n));
+  }
+  // Binomial: 2000 with a deviation of 42.
+  EXPECT_NEAR(static_cast<double>(lost), 2000.0, 5 * 42.0);
+  EXPECT_GT(apart, 3000U) << "2 x 0.1 x 0.9 of them";
+  sut.advance(MonotonicTime{Nanos{1000}});
+  EXPECT_FALSE(sut.loses(Component::kGnss, 0, 1)) << "it is over";
+}
+
+TEST(FaultLine, ABurstComesAgainForEver) {
+  FaultLine sut;
+  sut.advance(MonotonicTime{from_seconds(2.0)});
+  sut.inject({Component::kCan, FaultKind::kOff}, from_seconds(0.05), from_seconds(1.0));
+  for (const double at_s : {2.0, 2.049, 3.0, 3.049, 1002.04}) {
+    sut.advance(MonotonicTime{from_seconds(at_s)});
+    EXPECT_EQ(sut.of(Component::kCan), FaultKind::kOff) << at_s;
+    EXPECT_LT(sut.age(Component::kCan), from_seconds(0.05));
+  }
+  for (const double at_s : {2.051, 2.999, 3.06, 1002.06}) {
+    sut.advance(MonotonicTime{from_seconds(at_s)});
+    EXPECT_EQ(sut.of(Component::kCan), FaultKind::kNone) << at_s;
+  }
+}
+
+TEST(FaultLine, EverySizeIsOfAKindThatItsComponentHas) {
+  for (const FaultSize& row : kSizes) {
+    const ComponentSpec& spec = kComponents.at(static_cast<std::size_t>(row.component));
+    EXPECT_NE(spec.kinds & bit(row.kind), 0) << spec.name;
+    EXPECT_GE(row.usual, row.least) << spec.name;
+    EXPECT_LE(row.usual, row.most) << spec.name;
+  }
+  // Nothing else can be more or less of itself.
+  FaultLine sut;
+  sut.inject({Component::kGnss, FaultKind::kOff}, Nanos{1000});
+  EXPECT_EQ(sut.size(Component::kGnss), 0.0);
+  sut.inject({Component::kGnss, FaultKind::kJump}, Nanos{1000});
+  EXPECT_EQ(sut.size(Component::kGnss), 2.0);
+}
+
 TEST(FaultySensors, OnlyTheInstanceThatIsNamedFails) {
   FaultLine line;
   line.inject({Component::kDepth, FaultKind::kOff, 2}, Nanos{1000});
