@@ -140,18 +140,15 @@ struct FollowedLimits {
 [[nodiscard]] double thrust_to_weight_ratio(const VehicleModel& vehicle) noexcept;
 /// What pushes back at this air speed, as an acceleration.
 [[nodiscard]] double drag_mps2(const VehicleModel& vehicle, double speed_mps) noexcept;
-/// So much less than its numbers say is planned with: a vehicle as wide as six cells fits into six of them. Its box would touch a
-/// seventh one otherwise, however it lies, and what leads through six would be a way that no plan can follow.
-inline constexpr double kTouching_m = 1e-5;
 /// Distance that plans keep from everything.
 [[nodiscard]] inline double planned_radius_m(const VehicleModel& vehicle) noexcept {
-  return vehicle.radius_m + vehicle.tracking_error_m - kTouching_m;
+  return vehicle.radius_m + vehicle.tracking_error_m;
 }
 
 /// The same where it flies at most slow_speed_mps.
 [[nodiscard]] inline double slow_radius_m(const VehicleModel& vehicle) noexcept {
   const bool flies_slowly = vehicle.slow_error_m > 0.0 && vehicle.slow_error_m < vehicle.tracking_error_m;
-  return vehicle.radius_m + (flies_slowly ? vehicle.slow_error_m : vehicle.tracking_error_m) - kTouching_m;
+  return vehicle.radius_m + (flies_slowly ? vehicle.slow_error_m : vehicle.tracking_error_m);
 }
 
 /// What makes a vehicle that no flight is possible with, in words, or null. Precondition: out_of_bounds() is

@@ -4,7 +4,6 @@
 
 #include <vector>
 
-#include "core/vehicle_model.hpp"
 #include "tests/support/box_view.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
@@ -49,16 +48,6 @@ class LatticeSearchTest : public ::testing::Test {
 
 TEST_F(LatticeSearchTest, FindsASlotThatIsOneCellWiderThanTheVehicle) {
   wall(20, 9.0, 11.4);
-  ASSERT_EQ(connect(), Status::kOk);
-  expect_way();
-}
-
-TEST_F(LatticeSearchTest, FindsASlotAsWideAsAVehicleOfWholeCells) {
-  VehicleModel vehicle;
-  vehicle.radius_m = 0.6;  // and 0.3 m: six cells of 0.3 m
-  vehicle.tracking_error_m = 0.3;
-  request_.radius_m = planned_radius_m(vehicle);
-  wall(20, 9.0, 10.8);
   ASSERT_EQ(connect(), Status::kOk);
   expect_way();
 }
