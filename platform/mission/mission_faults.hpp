@@ -17,7 +17,7 @@ class MissionFaults {
  public:
   /// `config` must outlive it.
   explicit MissionFaults(const MissionConfig& config)
-      : config_(config), line_(config.seed), begun_(config.faults.size(), false) {}
+      : config_(config), begun_(config.faults.size(), false) {}
 
   [[nodiscard]] bool empty() const noexcept { return begun_.empty(); }
   /// For what can fail.

@@ -157,13 +157,10 @@ struct Fault {
   std::optional<double> size{};  ///< In the unit of its row; none: the usual one.
 };
 
-/// The faults of one flight; what is lost at random is a function of seed and number. Neither allocates nor
-/// blocks; one thread.
+/// The faults of one flight. Neither allocates nor blocks; one thread.
 class FaultLine {
  public:
   static constexpr std::size_t kMost = 32;
-
-  explicit FaultLine(std::uint64_t seed = 0) noexcept : seed_(seed) {}
 
   /// From now() on for `duration`, and again each `every` (0: once); beyond kMost it is ignored.
   void inject(const Fault& fault, Nanos duration, Nanos every = Nanos{0}) noexcept {
@@ -188,12 +185,12 @@ class FaultLine {
     const Active* a = find(component, instance);
     return a == nullptr ? Nanos{0} : a->age(now_);
   }
-  /// Whether what has this number is among the share that an intermittent fault loses.
+  /// Whether what has this number is among the share that an intermittent fault loses: a function of component,
+  /// instance and number alone.
   [[nodiscard]] bool loses(Component component, int instance, std::uint64_t number) const noexcept {
-    constexpr std::uint64_t kInstances = 8;
-    const std::uint64_t stream =
-        static_cast<std::uint64_t>(component) * kInstances + static_cast<std::uint64_t>(instance);
-    return core::CounterRng(seed_ ^ 0xfa17, (stream << 48U) ^ number).uniform() < size(component, instance);
+    const std::uint64_t stream = static_cast<std::uint64_t>(component) +
+                                 kComponentCount * static_cast<std::uint64_t>(instance);
+    return core::CounterRng(number, stream).uniform() < size(component, instance);
   }
 
  private:
@@ -216,7 +213,6 @@ class FaultLine {
     return nullptr;
   }
 
-  std::uint64_t seed_;
   core::StaticVector<Active, kMost> active_{};
   MonotonicTime now_{};
 };
