@@ -188,8 +188,8 @@ class FaultLine {
   /// Whether what has this number is among the share that an intermittent fault loses: a function of component,
   /// instance and number alone.
   [[nodiscard]] bool loses(Component component, int instance, std::uint64_t number) const noexcept {
-    const std::uint64_t stream = static_cast<std::uint64_t>(component) +
-                                 kComponentCount * static_cast<std::uint64_t>(instance);
+    const std::uint64_t stream =
+        static_cast<std::uint64_t>(component) + kComponentCount * static_cast<std::uint64_t>(instance);
     return core::CounterRng(number, stream).uniform() < size(component, instance);
   }
 

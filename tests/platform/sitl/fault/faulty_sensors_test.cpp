@@ -170,7 +170,8 @@ TEST(FaultLine, LosesTheShareThatItIsToldAndOtherOnesOfAnotherInstance) {
   constexpr std::uint64_t kNumbers = 20000;
   FaultLine sut, same;
   for (FaultLine* line : {&sut, &same})
-    line->inject({.component = Component::kDepth, .kind = FaultKind::kIntermittent, .size = 0.1}, Nanos{1000});
+    line->inject({.component = Component::kDepth, .kind = FaultKind::kIntermittent, .size = 0.1},
+                 Nanos{1000});
   std::uint64_t lost = 0, apart = 0, last_lost = 0;
   for (std::uint64_t n = 0; n < kNumbers; ++n) {
     if (sut.loses(Component::kDepth, 0, n)) ++lost, last_lost = n;
