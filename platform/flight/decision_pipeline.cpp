@@ -27,8 +27,8 @@ constexpr double kSlowEnough = 1.05;  // of the slow speed: what trajectories ke
 /// 14 they are at most 3 (clean cameras), 23 (d455).
 constexpr std::uint32_t kThinPixels = 32;
 constexpr Nanos kThinLasts{5'000'000'000};
-/// Of the vehicle's speed: what known way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
-constexpr double kBeyond = 0.5;
+/// What the way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
+constexpr double kBeyond_mps = 2.0;
 
 }  // namespace
 
@@ -366,10 +366,9 @@ void DecisionPipeline::remember(const DecisionInput& in, DecisionOutput& out) no
 }
 
 double DecisionPipeline::arrival_s(const Trajectory& trajectory, const DecisionInput& in) const noexcept {
-  double rest_m = stages::kUnknownWeight * (in.goal_W - trajectory.end_W()).norm();
-  if (ways_known_) rest_m = std::fmin(ways_->to_goal_m(trajectory.end_W()), 1e6);
-  return seconds(trajectory.start_time - in.now) + trajectory.duration_s() +
-         rest_m / (kBeyond * config_.vehicle.speed_mps);
+  double rest_m = (in.goal_W - trajectory.end_W()).norm();
+  if (ways_known_) rest_m = std::fmin(ways_->to_goal_m(trajectory.end_W()) / stages::kUnknownWeight, 1e6);
+  return seconds(trajectory.start_time - in.now) + trajectory.duration_s() + rest_m / kBeyond_mps;
 }
 
 void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noexcept {

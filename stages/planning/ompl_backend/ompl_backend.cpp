@@ -10,7 +10,6 @@
 #include <string>
 
 #include "firmware_if/assert.hpp"
-#include "stages/perception/swept_ball.hpp"
 #include "stages/planning/ompl_backend/ompl_space.hpp"
 
 namespace roborun::stages {
@@ -52,7 +51,8 @@ class OmplPlanner final : public Planner {
       return Status::kInvalidArgument;
     }
     core::Work& work = result.work;
-    if (!is_ball_free(view, request.start_W, request.radius_m, work.units)) return Status::kStartBlocked;
+    if (!view.is_free(Aabb::around(request.start_W, request.radius_m), work.units))
+      return Status::kStartBlocked;
     const bool goal_bad = !request.bounds_W.contains(request.goal_W) ||
                           view.at(request.goal_W, work.units) == CellState::kOccupied;
 

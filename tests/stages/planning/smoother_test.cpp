@@ -154,9 +154,8 @@ TEST(Smoother, IsNeverWorseThanStopping) {
   EXPECT_EQ(result.trajectory.hold_W, Vector3(7, 7, 7)) << "untouched";
 }
 
-TEST(Smoother, CutsACornerWhereTheBoxOfTheVehicleHasNoRoom) {
-  // A slot that leaves two centimetres around the vehicle: its box would touch on any curve, its ball does not, for the edge
-  // inside the corner is sqrt(2) times as far away as the walls.
+TEST(Smoother, StopsAtEachCornerWhereNoCurveFits) {
+  // A slot that leaves two centimetres around the box of the vehicle: any curve would touch.
   Smoother sut;
   test::BoxView view = open_view();
   const double side = 0.92;
@@ -170,17 +169,14 @@ TEST(Smoother, CutsACornerWhereTheBoxOfTheVehicleHasNoRoom) {
   const SmoothRequest request = request_of(path);
   ASSERT_EQ(sut.smooth(request, view, unlimited, result), Status::kOk);
   EXPECT_LT((result.trajectory.end_W() - Vector3(6, -8, 0)).norm(), 1e-9);
-  double slowest_mps = request.limits.speed_mps, nearest_m = side;
+  bool stops = false;
   for (double t = 0.0; t < result.trajectory.duration_s(); t += 0.01) {
     const TrajectoryPoint p = result.trajectory.at_s(t);
     EXPECT_LE(p.v_W.norm(), request.limits.speed_mps * 1.001);
     EXPECT_LE(p.a_W.norm(), request.limits.acceleration_mps2 * 1.001);
-    if ((p.p_W - corner).norm() < 1.0) slowest_mps = std::min(slowest_mps, p.v_W.norm());
-    for (const Aabb& wall : view.occupied)
-      nearest_m = std::min(nearest_m, (p.p_W - p.p_W.cwiseMax(wall.min_W).cwiseMin(wall.max_W)).norm());
+    stops = stops || ((p.p_W - corner).norm() < 0.05 && p.v_W.norm() < 0.1);
   }
-  EXPECT_GT(slowest_mps, 0.5);
-  EXPECT_GE(nearest_m, request.radius_m - 1e-3) << "of the chords";
+  EXPECT_TRUE(stops);
 }
 
 TEST(Smoother, KeepsThePointsThatANarrowPathNeeds) {
