@@ -27,8 +27,18 @@ constexpr double kSlowEnough = 1.05;  // of the slow speed: what trajectories ke
 /// 14 they are at most 3 (clean cameras), 23 (d455).
 constexpr std::uint32_t kThinPixels = 32;
 constexpr Nanos kThinLasts{5'000'000'000};
-/// What the way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
-constexpr double kBeyond_mps = 2.0;
+/// Of the vehicle's speed: what known way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
+constexpr double kBeyond = 0.5;
+
+/// Of depths, in any of the images.
+DepthError worst_error(std::span<const stages::PosedDepthFrame> frames) noexcept {
+  DepthError worst{.constant_m = 0.0, .quadratic_per_m = 0.0};
+  for (const stages::PosedDepthFrame& frame : frames) {
+    worst.constant_m = std::fmax(worst.constant_m, frame.error.constant_m);
+    worst.quadratic_per_m = std::fmax(worst.quadratic_per_m, frame.error.quadratic_per_m);
+  }
+  return worst;
+}
 
 }  // namespace
 
@@ -137,7 +147,8 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   stages::CloudNeed need = stages::needed_points(profiler, in.p_WB, relevant_W);
   need.reach_m = std::fmax(need.reach_m, MotionWatch::kReach_m);
   (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), need, budget, work);
-  motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W}, cloud_.points(), map_.view(), budget, work);
+  motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W, worst_error(in.frames)}, cloud_.points(), map_.view(),
+                budget, work);
   bodies_.observe(in.now, in.p_WB, motion_.appeared_W());
   bodies_.follow(in.now, in.p_WB, cloud_.points());
   out.motion = motion_.moving(in.now) || bodies_.near(in.now, in.p_WB, in.v_WB, MotionWatch::kReach_m);
@@ -366,9 +377,10 @@ void DecisionPipeline::remember(const DecisionInput& in, DecisionOutput& out) no
 }
 
 double DecisionPipeline::arrival_s(const Trajectory& trajectory, const DecisionInput& in) const noexcept {
-  double rest_m = (in.goal_W - trajectory.end_W()).norm();
-  if (ways_known_) rest_m = std::fmin(ways_->to_goal_m(trajectory.end_W()) / stages::kUnknownWeight, 1e6);
-  return seconds(trajectory.start_time - in.now) + trajectory.duration_s() + rest_m / kBeyond_mps;
+  double rest_m = stages::kUnknownWeight * (in.goal_W - trajectory.end_W()).norm();
+  if (ways_known_) rest_m = std::fmin(ways_->to_goal_m(trajectory.end_W()), 1e6);
+  return seconds(trajectory.start_time - in.now) + trajectory.duration_s() +
+         rest_m / (kBeyond * config_.vehicle.speed_mps);
 }
 
 void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noexcept {

@@ -1,17 +1,24 @@
 #include "platform/flight/motion_watch.hpp"
 
 #include <algorithm>
+#include <cmath>
 
+#include "core/geometry/math.hpp"
 #include "platform/flight/surface_middle.hpp"
 #include "stages/perception/polled_view.hpp"
 
 namespace roborun::flight {
 namespace {
 
-constexpr double kAppeared_m = 0.15;  // around a point, known to be free: depth noise is less
+// Around a point, known to be free: so much, and what depths are wrong by.
+constexpr double kAppeared_m = 0.05;
+constexpr double kSigmas = 3.0;
 constexpr int kLeastPoints = 3;
 constexpr double kStanding_mps = 0.5;
-constexpr double kSpacing_m = 0.6;  // of two traces
+// Points of one body: level, so near to each other, and so much above or below. Far away the pixels of an upright body are farther
+// apart than it is wide, and three of them lie one above the other.
+constexpr double kSpacing_m = 0.6;
+constexpr double kHigh_m = 1.5;
 constexpr Nanos kMemory{3'000'000'000};
 constexpr Nanos kTraceMemory{10'000'000'000};  // as long as the map may remember what has gone
 
@@ -32,9 +39,11 @@ void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> poi
     const Vector3 offset = point.p_W - in.p_WB;
     const bool behind = offset.dot(in.v_WB) < 0.0 && in.v_WB.norm() > kStanding_mps;
     if (offset.norm() > kReach_m || !in.relevant_W.contains(point.p_W)) continue;
-    if (!known.is_free_at_finest(Aabb::around(point.p_W, kAppeared_m), work.units)) continue;
+    const double around_m = kAppeared_m + kSigmas * in.error.at_m(offset.norm());
+    if (!known.is_free_at_finest(Aabb::around(point.p_W, around_m), work.units)) continue;
     const auto place = std::find_if(appeared.begin(), appeared.end(), [&point](const Place& other) {
-      return (other.p_W - point.p_W).squaredNorm() < kSpacing_m * kSpacing_m;
+      const Vector3 apart = other.p_W - point.p_W;
+      return core::hypot2(apart.x(), apart.y()) < kSpacing_m && std::fabs(apart.z()) < kHigh_m;
     });
     if (place != appeared.end()) {
       ++place->points;

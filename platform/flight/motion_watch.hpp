@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <span>
 
+#include "core/depth_error.hpp"
 #include "core/executive/stage_budget.hpp"
 #include "core/geometry/vector.hpp"
 #include "core/memory/static_vector.hpp"
@@ -25,7 +26,8 @@ class MotionWatch {
     MonotonicTime now{};
     Vector3 p_WB = Vector3::Zero();
     Vector3 v_WB = Vector3::Zero();
-    Aabb relevant_W{};  ///< What moves outside of it does not matter.
+    Aabb relevant_W{};   ///< What moves outside of it does not matter.
+    DepthError error{};  ///< Of the depths; where the vehicle is believed to be was as wrong a moment ago.
   };
 
   /// Compares the cloud of this decision with `known`, the map before it gets the same images. What

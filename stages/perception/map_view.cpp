@@ -4,13 +4,14 @@
 #include <cmath>
 
 #include "core/random/counter_rng.hpp"
+#include "stages/perception/swept_ball.hpp"
 
 namespace roborun::stages {
 namespace {
 
 constexpr double kMaxSegment_m = 10e3;
 
-/// Number of boxes along `length_m` and their spacing.
+/// Of the pieces that a way is checked in.
 double spacing_m(const MapView& view, double radius_m) noexcept {
   return std::max(radius_m, 0.5 * view.cell_m());
 }
@@ -114,13 +115,10 @@ bool is_segment_free(const MapView& view, const Vector3& a_W, const Vector3& b_W
   const double length_m = (b_W - a_W).norm();
   if (!(length_m <= kMaxSegment_m) || !(radius_m >= 0.0)) return false;  // NaN included
   const int pieces = 1 + static_cast<int>(length_m / std::max(spacing_m(view, radius_m), 0.05));
-  // Consecutive boxes around the way between two samples: together they cover all that the vehicle sweeps.
   Vector3 from_W = a_W;
   for (int i = 1; i <= pieces; ++i) {
     const Vector3 to_W = a_W + (static_cast<double>(i) / pieces) * (b_W - a_W);
-    const Aabb swept{from_W.cwiseMin(to_W) - Vector3::Constant(radius_m),
-                     from_W.cwiseMax(to_W) + Vector3::Constant(radius_m)};
-    if (!view.is_free(swept, lookups)) return false;
+    if (!is_swept_free(view, from_W, to_W, radius_m, lookups)) return false;
     from_W = to_W;
   }
   return true;
@@ -131,7 +129,7 @@ double free_distance_m(const MapView& view, const Vector3& from_W, const Vector3
   const double norm = direction_W.norm();
   if (!(norm > 0.0) || !std::isfinite(norm) || !is_finite(from_W) || !(max_m > 0.0) || !(radius_m >= 0.0))
     return 0.0;
-  if (!view.is_free(Aabb::around(from_W, radius_m), lookups)) return 0.0;
+  if (!is_ball_free(view, from_W, radius_m, lookups)) return 0.0;
   const double limit_m = std::min(max_m, kMaxSegment_m);
   const double step_m = std::max(0.5 * spacing_m(view, radius_m), 0.05);
   double free_m = 0.0;
@@ -140,9 +138,7 @@ double free_distance_m(const MapView& view, const Vector3& from_W, const Vector3
     const double next_m = std::min(i * step_m, limit_m);
     const Vector3 a_W = from_W + (free_m / norm) * direction_W;
     const Vector3 b_W = from_W + (next_m / norm) * direction_W;
-    const Aabb swept{a_W.cwiseMin(b_W) - Vector3::Constant(radius_m),
-                     a_W.cwiseMax(b_W) + Vector3::Constant(radius_m)};
-    if (!view.is_free(swept, lookups)) break;
+    if (!is_swept_free(view, a_W, b_W, radius_m, lookups)) break;
     free_m = next_m;
   }
   return free_m;

@@ -88,10 +88,8 @@ class FinestView final : public MapView {
   const MapView& view_;
 };
 
-/// True if a vehicle of this radius can move straight from a to b through known free space: boxes of
-/// half-edge radius_m + spacing / 2 are checked along the segment at a spacing of at most max(radius_m, cell
-/// / 2), both ends included, so that their union covers the swept box. RT-safe: O(length / radius_m) calls of
-/// is_free().
+/// True if a ball of this radius can move straight from a to b through known free space (swept_ball.hpp), both ends included,
+/// in pieces of at most max(radius_m, cell / 2). RT-safe: O(length / radius_m) of them.
 [[nodiscard]] bool is_segment_free(const MapView& view, const Vector3& a_W, const Vector3& b_W,
                                    double radius_m, std::uint64_t& lookups) noexcept;
 

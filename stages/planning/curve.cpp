@@ -37,6 +37,19 @@ struct Leg {
   Vector3 direction = Vector3::Zero();
   double length_m{};
   double limit_mps{};
+  ChangeLimits braking;
+  ChangeLimits faster;  ///< Where the speed goes up.
+};
+
+/// A corner of the course.
+struct Turn {
+  double bend{};  ///< Change of direction: the norm of the difference.
+  ChangeLimits limits;
+  /// What it takes of both legs.
+  [[nodiscard]] double way_m(double speed_mps) const noexcept {
+    const double delta_mps = speed_mps * bend;
+    return delta_mps > 0.0 ? 0.5 * speed_mps * change_s(delta_mps, limits) : 0.0;
+  }
 };
 
 /// The change at the start, up to where the first leg begins.
@@ -49,12 +62,7 @@ struct Beginning {
 class Fitter {
  public:
   Fitter(const Course& course, const MotionLimits& limits, Trajectory& out, SegmentParts& part) noexcept
-      : course_(course),
-        limits_(limits),
-        change_{limits.acceleration_mps2, limits.jerk_mps3},
-        faster_{std::min(limits.acceleration_mps2, limits.speeding_up_mps2), limits.jerk_mps3},
-        out_(out),
-        part_(part) {}
+      : course_(course), limits_(limits), out_(out), part_(part) {}
 
   CurveFit fit(const TrajectoryPoint& start) noexcept;
 
@@ -62,13 +70,15 @@ class Fitter {
   static constexpr std::size_t kMaxPoints = Course::kMaxPoints;
 
   [[nodiscard]] Leg leg_between(const Vector3& from_W, const Vector3& to_W) const noexcept;
-  /// What a turn at corner i takes of both legs.
-  [[nodiscard]] double turn_m(std::size_t i, double speed_mps) const noexcept {
-    return 0.5 * speed_mps * change_s(speed_mps * bend_[i], change_);
+  /// Within `most_mps2`, for a change of velocity along `way`: what is up or down of it keeps the vertical limit.
+  [[nodiscard]] ChangeLimits limits_along(const Vector3& way, double most_mps2) const noexcept;
+  [[nodiscard]] Turn turn_between(const Vector3& from_direction, const Vector3& to_direction) const noexcept {
+    const Vector3 way = to_direction - from_direction;
+    return {way.norm(), limits_along(way, limits_.acceleration_mps2)};
   }
-  void measure_bend(std::size_t i) noexcept { bend_[i] = (leg_[i].direction - leg_[i - 1].direction).norm(); }
-  void limit_vertical() noexcept;
   void limit_corners() noexcept;
+  /// At corner i, with this turn: no faster than what can be braked to the next point's speed.
+  [[nodiscard]] double braked_mps(std::size_t i, const Turn& turn) const noexcept;
   void limit_backwards() noexcept;
   void limit_forwards() noexcept;
   [[nodiscard]] bool begin(const TrajectoryPoint& start) noexcept;
@@ -84,8 +94,6 @@ class Fitter {
 
   const Course& course_;
   const MotionLimits& limits_;
-  ChangeLimits change_;  ///< Braking, and turns.
-  ChangeLimits faster_;  ///< Where the speed goes up.
   Trajectory& out_;
   SegmentParts& part_;
   TrajectoryPoint at_;  ///< Where the curve is so far.
@@ -93,9 +101,16 @@ class Fitter {
   std::size_t count_{};  ///< Points.
   Vector3 from_W_ = Vector3::Zero();
   std::array<Leg, kMaxPoints> leg_;
-  std::array<double, kMaxPoints> bend_{};   ///< Change of direction at a corner: the norm of the difference.
+  std::array<Turn, kMaxPoints> turn_;       ///< At the corners.
   std::array<double, kMaxPoints> speed_{};  ///< At the points.
 };
+
+ChangeLimits Fitter::limits_along(const Vector3& way, double most_mps2) const noexcept {
+  const double rise_m = std::fabs(way.z()), length_m = way.norm();
+  if (rise_m * most_mps2 > limits_.vertical_mps2 * length_m)
+    most_mps2 = limits_.vertical_mps2 * length_m / rise_m;
+  return {most_mps2, limits_.jerk_mps3};
+}
 
 Leg Fitter::leg_between(const Vector3& from_W, const Vector3& to_W) const noexcept {
   Leg leg;
@@ -105,23 +120,9 @@ Leg Fitter::leg_between(const Vector3& from_W, const Vector3& to_W) const noexce
   const double vertical_mps = way.z() > 0.0 ? limits_.climb_mps : limits_.descent_mps;
   const double rise = std::fabs(leg.direction.z());
   leg.limit_mps = rise * limits_.speed_mps > vertical_mps ? vertical_mps / rise : limits_.speed_mps;
+  leg.braking = limits_along(way, limits_.acceleration_mps2);
+  leg.faster = limits_along(way, std::min(limits_.acceleration_mps2, limits_.speeding_up_mps2));
   return leg;
-}
-
-/// One acceleration for the whole course, so that its steepest leg and the most upright of its turns keep the vertical
-/// limit. Turns that hardly climb or sink differently than before are too short to matter.
-void Fitter::limit_vertical() noexcept {
-  constexpr double kHardly = 0.05;
-  const auto limit = [&](const Vector3& way) {
-    const double rise = std::fabs(way.z());
-    if (rise * change_.acceleration_mps2 > limits_.vertical_mps2 * way.norm() && rise > kHardly)
-      change_.acceleration_mps2 = limits_.vertical_mps2 * way.norm() / rise;
-  };
-  for (std::size_t i = 0; i + 1 < count_; ++i) {
-    limit(leg_[i].direction);
-    if (i > 0) limit(leg_[i].direction - leg_[i - 1].direction);
-  }
-  faster_.acceleration_mps2 = std::min(faster_.acceleration_mps2, change_.acceleration_mps2);
 }
 
 /// Speeds at the corners for which both turns of a leg find room on it. Where they do not at the speeds that the
@@ -129,9 +130,9 @@ void Fitter::limit_vertical() noexcept {
 void Fitter::limit_corners() noexcept {
   std::array<double, kMaxPoints> wanted_m{};
   for (std::size_t i = 1; i + 1 < count_; ++i) {
-    measure_bend(i);
+    turn_[i] = turn_between(leg_[i - 1].direction, leg_[i].direction);
     speed_[i] = course_.share[i] > 0.0 ? std::min(leg_[i - 1].limit_mps, leg_[i].limit_mps) : 0.0;
-    wanted_m[i] = turn_m(i, speed_[i]);
+    wanted_m[i] = turn_[i].way_m(speed_[i]);
   }
   const auto room_m = [&](std::size_t leg, std::size_t i, std::size_t other) {
     const double both_m = wanted_m[i] + wanted_m[other];
@@ -139,19 +140,20 @@ void Fitter::limit_corners() noexcept {
   };
   for (std::size_t i = 1; i + 1 < count_; ++i) {
     const double most_m = course_.share[i] * std::min(room_m(i - 1, i, i - 1), room_m(i, i, i + 1));
-    speed_[i] = highest_mps(speed_[i], [&](double v) { return turn_m(i, v) <= most_m; });
+    speed_[i] = highest_mps(speed_[i], [&](double v) { return turn_[i].way_m(v) <= most_m; });
   }
   speed_[count_ - 1] = 0.0;
 }
 
-/// No faster than what can be braked to the next point's speed.
+double Fitter::braked_mps(std::size_t i, const Turn& turn) const noexcept {
+  const double left_m = leg_[i].length_m - turn_[i + 1].way_m(speed_[i + 1]);
+  return highest_mps(speed_[i], [&](double v) {
+    return turn.way_m(v) + (v > speed_[i + 1] ? change_m(v, speed_[i + 1], leg_[i].braking) : 0.0) <= left_m;
+  });
+}
+
 void Fitter::limit_backwards() noexcept {
-  for (std::size_t i = count_ - 1; i-- > 1;) {
-    const double left_m = leg_[i].length_m - turn_m(i + 1, speed_[i + 1]);
-    speed_[i] = highest_mps(speed_[i], [&](double v) {
-      return turn_m(i, v) + (v > speed_[i + 1] ? change_m(v, speed_[i + 1], change_) : 0.0) <= left_m;
-    });
-  }
+  for (std::size_t i = count_ - 1; i-- > 1;) speed_[i] = braked_mps(i, turn_[i]);
 }
 
 /// No faster than what can be reached from the point before. Never slower than there: the least difference takes a way
@@ -160,22 +162,19 @@ void Fitter::limit_forwards() noexcept {
   for (std::size_t i = 1; i + 1 < count_; ++i) {
     const double before_mps = speed_[i - 1];
     if (speed_[i] <= before_mps) continue;
-    const double left_m = leg_[i - 1].length_m - (i > 1 ? turn_m(i - 1, before_mps) : 0.0);
+    const double left_m = leg_[i - 1].length_m - (i > 1 ? turn_[i - 1].way_m(before_mps) : 0.0);
     speed_[i] = before_mps + highest_mps(speed_[i] - before_mps, [&](double more) {
                   const double v = before_mps + more;
-                  return turn_m(i, v) + change_m(before_mps, v, faster_) <= left_m;
+                  return turn_[i].way_m(v) + change_m(before_mps, v, leg_[i - 1].faster) <= left_m;
                 });
   }
 }
 
-/// What is up or down of it keeps the vertical limit, like legs and turns.
 ChangeLimits Fitter::first_change(const TrajectoryPoint& start, const Vector3& v_W) const noexcept {
-  ChangeLimits limits = v_W.norm() > start.v_W.norm() ? faster_ : change_;
-  const Vector3 delta = v_W - start.v_W;
-  const double rise = std::fabs(delta.z()), length = delta.norm();
-  if (rise * limits.acceleration_mps2 > limits_.vertical_mps2 * length)
-    limits.acceleration_mps2 = limits_.vertical_mps2 * length / rise;
-  return limits;
+  const bool speeds_up = v_W.norm() > start.v_W.norm();
+  const double most_mps2 =
+      speeds_up ? std::min(limits_.acceleration_mps2, limits_.speeding_up_mps2) : limits_.acceleration_mps2;
+  return limits_along(v_W - start.v_W, most_mps2);
 }
 
 /// The direction of the leg depends on where the change ends, and that on the direction: a few rounds.
@@ -195,12 +194,12 @@ bool Fitter::leads_on(const TrajectoryPoint& start, double speed_mps, const Aim&
   const Vector3 flown = speed_mps > kAtRest ? Vector3(out.v_W / speed_mps) : direction;
   if (!aimed && !((direction - flown).norm() < kRough.error)) return false;
   if (speed_mps > out.leg.limit_mps * 1.0000001) return false;
-  const double next_mps = speed_[1];
-  if (count_ == 2) return change_m(speed_mps, 0.0, change_) <= out.leg.length_m + kSlack_m;
-  const double bend = (leg_[1].direction - direction).norm();
-  const double least_mps = std::min(next_mps, speed_mps);
-  const double turn_m = 0.5 * least_mps * change_s(least_mps * bend, change_);
-  return turn_m + change_m(speed_mps, least_mps, change_) <= out.leg.length_m + kSlack_m;
+  if (count_ == 2) return change_m(speed_mps, 0.0, out.leg.braking) <= out.leg.length_m + kSlack_m;
+  // The corner bends otherwise than where its speed was looked for: the first leg comes from elsewhere.
+  const Turn turn = turn_between(direction, leg_[1].direction);
+  const double least_mps = std::min(braked_mps(1, turn), speed_mps);
+  return turn.way_m(least_mps) + change_m(speed_mps, least_mps, out.leg.braking) <=
+         out.leg.length_m + kSlack_m;
 }
 
 bool Fitter::begin(const TrajectoryPoint& start) noexcept {
@@ -216,7 +215,8 @@ bool Fitter::begin(const TrajectoryPoint& start) noexcept {
   if (count_ > 2) {
     // From where the first leg ends: where no direction settles, a tenth of a millimetre per metre beside the corner.
     leg_[1] = leg_between(at_.p_W + leg_[0].length_m * leg_[0].direction, course_.point_W[2]);
-    measure_bend(1);
+    turn_[1] = turn_between(leg_[0].direction, leg_[1].direction);
+    speed_[1] = braked_mps(1, turn_[1]);
   }
   return true;
 }
@@ -254,10 +254,11 @@ bool Fitter::add_change(const Vector3& v_W, const ChangeLimits& limits, std::siz
 CurveFit Fitter::add_leg(std::size_t i) noexcept {
   const Leg& leg = leg_[i];
   const double from_mps = speed_[i], to_mps = speed_[i + 1];
-  const double turns_m = (i > 0 ? turn_m(i, from_mps) : 0.0) + (i + 2 < count_ ? turn_m(i + 1, to_mps) : 0.0);
+  const double turns_m =
+      (i > 0 ? turn_[i].way_m(from_mps) : 0.0) + (i + 2 < count_ ? turn_[i + 1].way_m(to_mps) : 0.0);
   const double length_m = leg.length_m - turns_m;
   const auto way_m = [&](double peak) {
-    return change_m(from_mps, peak, faster_) + change_m(peak, to_mps, change_);
+    return change_m(from_mps, peak, leg.faster) + change_m(peak, to_mps, leg.braking);
   };
   const double least_mps = std::max(from_mps, to_mps);
   if (way_m(least_mps) > length_m + 1e-6) return CurveFit::kTooFast;
@@ -265,13 +266,14 @@ CurveFit Fitter::add_leg(std::size_t i) noexcept {
                                       [&](double more) { return way_m(least_mps + more) <= length_m; });
   const double peak_mps = least_mps + more_mps;
   const std::size_t straight = 2 * i + 1;
-  bool room = add_change(peak_mps * leg.direction, faster_, straight);
+  bool room = add_change(peak_mps * leg.direction, leg.faster, straight);
   const double cruise_m = length_m - way_m(peak_mps);
   if (peak_mps > kAtRest && cruise_m > 0.0)
     room = room && add({Vector3::Zero(), cruise_m / peak_mps}, straight);
   out_.brake_begin_s = now_s_;
-  room = room && add_change(to_mps * leg.direction, change_, straight);
-  if (i + 2 < count_) room = room && add_change(to_mps * leg_[i + 1].direction, change_, straight + 1);
+  room = room && add_change(to_mps * leg.direction, leg.braking, straight);
+  if (i + 2 < count_)
+    room = room && add_change(to_mps * leg_[i + 1].direction, turn_[i + 1].limits, straight + 1);
   return room ? CurveFit::kOk : CurveFit::kTooManyPoints;
 }
 
@@ -289,14 +291,14 @@ CurveFit Fitter::fit(const TrajectoryPoint& start) noexcept {
   at_ = start;
   count_ = course_.point_W.size();
   if (course_.start_share <= 0.0) {
-    if (!add_change(Vector3::Zero(), change_, 0)) return CurveFit::kTooManyPoints;
+    if (!add_change(Vector3::Zero(), limits_along(at_.v_W, limits_.acceleration_mps2), 0))
+      return CurveFit::kTooManyPoints;
     if (count_ == 2 && (course_.point_W[1] - at_.p_W).norm() < kHere_m) return CurveFit::kOk;
   }
   from_W_ = at_.p_W;
   leg_[0] = leg_between(from_W_, course_.point_W[1]);
   for (std::size_t i = 1; i + 1 < count_; ++i)
     leg_[i] = leg_between(course_.point_W[i], course_.point_W[i + 1]);
-  limit_vertical();
   limit_corners();
   limit_backwards();
   if (at_.v_W.norm() < kAtRest && at_.a_W.norm() < kAtRest)

@@ -7,6 +7,7 @@
 #include "core/geometry/math.hpp"
 #include "firmware_if/assert.hpp"
 #include "stages/perception/polled_view.hpp"
+#include "stages/perception/swept_ball.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -181,7 +182,7 @@ std::int32_t RrtStar::try_extend(Search& s, const Vector3& sample_W, double boun
   const double from_start_m = (p_W - request.start_W).norm();
   const double to_goal_m = (request.goal_W - p_W).norm();
   if (from_start_m > request.horizon_m || from_start_m + to_goal_m >= bound_m) return -1;
-  if (!s.view.is_free(Aabb::around(p_W, request.radius_m), s.work.units)) return -1;
+  if (!is_ball_free(s.view, p_W, request.radius_m, s.work.units)) return -1;
 
   const double n = static_cast<double>(count_ + 1);
   // At least the (log n / n)^(1/3) that RRT* asks for.
@@ -264,7 +265,7 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
   const PolledView view(map, budget, work);
   Spare spare(work);
   const PolledView spare_view(map, spare, work);
-  if (!map.is_free(Aabb::around(request.start_W, request.radius_m), work.units)) return Status::kStartBlocked;
+  if (!is_ball_free(map, request.start_W, request.radius_m, work.units)) return Status::kStartBlocked;
   const bool goal_bad = !request.bounds_W.contains(request.goal_W) ||
                         view.at(request.goal_W, work.units) == CellState::kOccupied;
 
@@ -274,7 +275,7 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
   const double to_target_m = (target_W - request.start_W).norm();
   // 1. The goal is known free space: a path that ends there.
   if (to_target_m > kShortEdge_m && target_W == request.goal_W && !goal_bad &&
-      view.is_free(Aabb::around(target_W, request.radius_m), work.units)) {
+      is_ball_free(view, target_W, request.radius_m, work.units)) {
     const Status status = connect(s, result);
     if (status != Status::kNoPath) return status;
   }

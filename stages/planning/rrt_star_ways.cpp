@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stages/perception/swept_ball.hpp"
 #include "stages/planning/rrt_star.hpp"
 #include "stages/planning/ways.hpp"
 
@@ -34,7 +35,7 @@ bool RrtStar::follow_ways(Search& s, const MapView& map, double below_m, PlanRes
   for (std::size_t i = count; i-- > 0 && rounds < kSampled;) {
     const double straight_m = (way_W[i] - s.request.start_W).norm();
     if (straight_m < kShortest_m || !pays(way_W[i], straight_m) ||
-        !map.is_free(Aabb::around(way_W[i], s.request.radius_m), s.work.units))
+        !is_ball_free(map, way_W[i], s.request.radius_m, s.work.units))
       continue;
     PlanRequest request = s.request;
     request.goal_W = way_W[i];
@@ -83,7 +84,7 @@ Path RrtStar::chain(Search& s, std::span<const Vector3> way_W) noexcept {
       piece.start_W = path_W.back();
       piece.goal_W = way_W[next];
       piece.horizon_m = (piece.goal_W - piece.start_W).norm() + kAround_m;
-      if (!s.view.is_free(Aabb::around(piece.goal_W, radius_m), s.work.units)) continue;
+      if (!is_ball_free(s.view, piece.goal_W, radius_m, s.work.units)) continue;
       if (++searches > kChained ||
           lattice_.connect(piece, s.view, s.budget, s.work, piece_W) == Status::kBudgetSpent)
         return path_W;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/memory/static_vector.hpp"
+#include "stages/perception/swept_ball.hpp"
 #include "stages/planning/curve.hpp"
 
 namespace roborun::stages {
@@ -337,20 +338,17 @@ bool append_rest_to_rest(const Vector3& from_W, const Vector3& to_W, const Motio
 
 namespace {
 
-/// Of a segment between two times, along a chord. Around a slanting chord there is more than the vehicle touches, around
-/// parts of it there is less.
+/// Of a segment between two times: the box around its chord, or the ball along parts of it, from which the curve is nowhere apart.
 bool is_chord_free(const MapView& view, const PolynomialSegment& segment, double from_s, double to_s,
                    double radius_m, std::uint64_t& lookups) noexcept {
   constexpr int kParts = 8;
   const Vector3 r = Vector3::Constant(radius_m);
-  const auto is_swept_free = [&](const Vector3& a_W, const Vector3& b_W) {
-    return view.is_free({a_W.cwiseMin(b_W) - r, a_W.cwiseMax(b_W) + r}, lookups);
-  };
   Vector3 last_W = position_W(segment, from_s);
-  if (is_swept_free(last_W, position_W(segment, to_s))) return true;
+  const Vector3 end_W = position_W(segment, to_s);
+  if (view.is_free({last_W.cwiseMin(end_W) - r, last_W.cwiseMax(end_W) + r}, lookups)) return true;
   for (int part = 1; part <= kParts; ++part) {
     const Vector3 p_W = position_W(segment, from_s + (to_s - from_s) * part / kParts);
-    if (!is_swept_free(last_W, p_W)) return false;
+    if (!is_swept_free(view, last_W, p_W, radius_m, lookups)) return false;
     last_W = p_W;
   }
   return true;
@@ -379,7 +377,7 @@ double free_until_s(const MapView& view, const Trajectory& trajectory, double fr
   constexpr double kForEver = std::numeric_limits<double>::infinity();
   const double start_s = from_s > 0.0 ? from_s : 0.0;
   if (trajectory.segment_count == 0)
-    return view.is_free(Aabb::around(trajectory.hold_W, radius_m), lookups) ? kForEver : start_s;
+    return is_ball_free(view, trajectory.hold_W, radius_m, lookups) ? kForEver : start_s;
   double segment_begin_s = 0.0;
   for (std::size_t k = 0; k < trajectory.segment_count; ++k) {
     const double duration_s = trajectory.segment[k].duration_s;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "stages/perception/polled_view.hpp"
+#include "stages/perception/swept_ball.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -100,8 +101,7 @@ bool find_way_out(const WayOutRequest& request, const MapView& view, const MapVi
       const Vector3 end_W = piece.at_W(piece.length_m);
       Trajectory line;
       line.start_time = request.start_time;
-      if (!request.bounds_W.contains(end_W) ||
-          !polled.is_free(Aabb::around(end_W, request.room_m), work.units) ||
+      if (!request.bounds_W.contains(end_W) || !is_ball_free(polled, end_W, request.room_m, work.units) ||
           !append_rest_to_rest(request.start_W, end_W, request.limits, line) ||
           !is_trajectory_free(standing, line, 0.0, request.body_m, work.units) ||
           (touches && !keeps_off_all(piece, polled_known, request.body_m, work.units)))

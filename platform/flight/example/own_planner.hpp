@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/geometry/math.hpp"
+#include "stages/perception/swept_ball.hpp"
 #include "stages/planning/planner.hpp"
 
 namespace example {
@@ -21,7 +22,7 @@ class StraightPlanner final : public roborun::stages::Planner {
     if (!is_finite(request.start_W) || !is_finite(request.goal_W) ||
         !((request.bounds_W.size().array() > 0.0).all()))
       return Status::kInvalidArgument;
-    if (!view.is_free(Aabb::around(request.start_W, request.radius_m), result.work.units))
+    if (!stages::is_ball_free(view, request.start_W, request.radius_m, result.work.units))
       return Status::kStartBlocked;
     const Vector3 to_goal = request.goal_W - request.start_W;
     if (to_goal.norm() < view.cell_m()) return Status::kNoPath;  // there already

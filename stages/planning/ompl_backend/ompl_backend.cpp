@@ -10,6 +10,7 @@
 #include <string>
 
 #include "firmware_if/assert.hpp"
+#include "stages/perception/swept_ball.hpp"
 #include "stages/planning/ompl_backend/ompl_space.hpp"
 
 namespace roborun::stages {
@@ -51,8 +52,7 @@ class OmplPlanner final : public Planner {
       return Status::kInvalidArgument;
     }
     core::Work& work = result.work;
-    if (!view.is_free(Aabb::around(request.start_W, request.radius_m), work.units))
-      return Status::kStartBlocked;
+    if (!is_ball_free(view, request.start_W, request.radius_m, work.units)) return Status::kStartBlocked;
     const bool goal_bad = !request.bounds_W.contains(request.goal_W) ||
                           view.at(request.goal_W, work.units) == CellState::kOccupied;
 

@@ -38,6 +38,8 @@
 
 #include <array>
 
+#include "stages/perception/swept_ball.hpp"
+
 namespace roborun::stages {
 namespace {
 
@@ -118,7 +120,7 @@ ob::SpaceInformationPtr make_ompl_space(const MapView& view, const Aabb& bounds_
   space->setBounds(bounds);
   auto info = std::make_shared<ob::SpaceInformation>(space);
   info->setStateValidityChecker([&view, &lookups, radius_m](const ob::State* s) {
-    return view.is_free(Aabb::around(to_vector(s), radius_m), lookups);
+    return is_ball_free(view, to_vector(s), radius_m, lookups);
   });
   info->setMotionValidator(std::make_shared<SegmentValidator>(info.get(), view, radius_m, lookups));
   info->setup();

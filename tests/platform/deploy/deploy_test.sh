@@ -33,6 +33,14 @@ knows_every_key() {
   [[ -z $out ]] || { echo "$out"; return 1; }
 }
 check "systemd-analyze verify" knows_every_key
+is_shut() {
+  local exposure
+  exposure=$(systemd-analyze security --offline=true --no-pager "$unit" 2>/dev/null | sed -n 's/.*exposure level for .*: \([0-9.]*\) .*/\1/p')
+  [[ -n $exposure ]] || { echo "no systemd-analyze that judges a file here: not checked"; return 0; }
+  echo "exposure $exposure"
+  awk -v is="$exposure" 'BEGIN { exit !(is <= 1.5) }'
+}
+check "systemd-analyze security: exposed at most 1.5" is_shut
 # What systemd leaves of its calls in the end; without these two it is killed at its start (platform/rt/confinement.cpp).
 may_confine_itself() {
   [[ $(grep '^SystemCallFilter=' "$unit" | tail -n 1) == "SystemCallFilter=capset seccomp" ]]

@@ -1,0 +1,59 @@
+#include "platform/flight/motion_watch.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "tests/support/box_view.hpp"
+
+namespace roborun::flight {
+namespace {
+
+/// All is known to be free but a wall from y = 2 on.
+struct Scene {
+  test::BoxView view;
+  MotionWatch watch;
+  MotionWatch::Input in{.now = MonotonicTime{std::chrono::seconds{1}},
+                        .relevant_W = {Vector3(-50, -50, -50), Vector3(50, 50, 50)},
+                        .error = {.constant_m = 0.01, .quadratic_per_m = 0.0}};
+  std::vector<stages::CloudPoint> points;
+
+  Scene() {
+    view.free_W = {Vector3(-60, -60, -60), Vector3(60, 60, 60)};
+    view.occupied.push_back({Vector3(-60, 2, -60), Vector3(60, 60, 60)});
+  }
+  void see(const Vector3& p_W) { points.push_back({p_W, 1}); }
+  std::size_t appeared() {
+    core::UnlimitedBudget unlimited;
+    core::Work work;
+    watch.sense(in, points, view, unlimited, work);
+    return watch.appeared_W().size();
+  }
+};
+
+TEST(MotionWatch, SeesAnUprightBodyByOnePixelAboveTheOther) {
+  Scene scene;
+  for (const double z_m : {2.0, 2.45, 2.9}) scene.see(Vector3(10, 0, z_m));
+  EXPECT_EQ(scene.appeared(), 1U);
+  EXPECT_TRUE(scene.watch.moving(scene.in.now));
+}
+
+TEST(MotionWatch, TakesPointsHereAndThereForNoBody) {
+  Scene scene;
+  for (const double y_m : {-1.6, -0.8, 0.0}) scene.see(Vector3(10, y_m, 2.0));
+  for (const double z_m : {-2.0, 6.0}) scene.see(Vector3(10, 0, z_m));
+  EXPECT_EQ(scene.appeared(), 0U);
+  EXPECT_FALSE(scene.watch.moving(scene.in.now));
+}
+
+TEST(MotionWatch, TakesForNoiseWhatTheDepthsMayBeWrongBy) {
+  for (const double error_m : {0.01, 0.05}) {
+    Scene scene;
+    scene.in.error.constant_m = error_m;
+    for (const double z_m : {2.0, 2.2, 2.4}) scene.see(Vector3(10, 1.85, z_m));
+    EXPECT_EQ(scene.appeared(), error_m < 0.03 ? 1U : 0U) << error_m;
+  }
+}
+
+}  // namespace
+}  // namespace roborun::flight
