@@ -15,9 +15,7 @@ constexpr double kAppeared_m = 0.05;
 constexpr double kSigmas = 3.0;
 constexpr int kLeastPoints = 3;
 constexpr double kStanding_mps = 0.5;
-// Points of one body: level, so near to each other, and so much above or below. Far away the pixels of an upright body are farther
-// apart than it is wide, and three of them lie one above the other.
-constexpr double kSpacing_m = 0.6;
+// Points of one body may lie so much above each other: far away the pixels of an upright one are farther apart than it is wide.
 constexpr double kHigh_m = 1.5;
 constexpr Nanos kMemory{3'000'000'000};
 constexpr Nanos kTraceMemory{10'000'000'000};  // as long as the map may remember what has gone
@@ -43,7 +41,7 @@ void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> poi
     if (!known.is_free_at_finest(Aabb::around(point.p_W, around_m), work.units)) continue;
     const auto place = std::find_if(appeared.begin(), appeared.end(), [&point](const Place& other) {
       const Vector3 apart = other.p_W - point.p_W;
-      return core::hypot2(apart.x(), apart.y()) < kSpacing_m && std::fabs(apart.z()) < kHigh_m;
+      return core::hypot2(apart.x(), apart.y()) < kBodyReach_m && std::fabs(apart.z()) < kHigh_m;
     });
     if (place != appeared.end()) {
       ++place->points;

@@ -32,7 +32,7 @@ enum class CurveFit : std::uint8_t {
   kTooManyPoints  ///< More segments than a trajectory has.
 };
 
-/// Makes the trajectory of this course: its segments and where the final braking begins. The box around it is not checked.
+/// Makes the trajectory of this course: its segments and where the final braking begins. Whether it is free is not checked.
 /// RT-safe: O(points), each with a bounded number of halvings.
 [[nodiscard]] CurveFit fit_curve(const Course& course, const TrajectoryPoint& start,
                                  const MotionLimits& limits, Trajectory& out, SegmentParts& part) noexcept;

@@ -39,7 +39,7 @@ struct SmoothRequest {
   TrajectoryPoint start{};            ///< State at the instant when the trajectory takes over.
   MonotonicTime start_time{};
   MotionLimits limits{};
-  double radius_m{};  ///< This box around every point of the curve must be free.
+  double radius_m{};  ///< A ball around every point of the curve that must be free.
 };
 
 struct SmoothResult {
