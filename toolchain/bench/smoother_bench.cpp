@@ -36,6 +36,15 @@ double quantile(std::vector<double> values, double q) {
   return values[static_cast<std::size_t>(std::ceil(q * static_cast<double>(values.size() - 1)))];
 }
 
+/// In free space, apart from all that is not, told without the map's own questions.
+bool is_ball_apart(const test::BoxView& view, const Vector3& p_W, double radius_m) {
+  const Aabb box_W = Aabb::around(p_W, radius_m);
+  return view.free_W.contains(box_W.min_W) && view.free_W.contains(box_W.max_W) &&
+         std::none_of(view.occupied.begin(), view.occupied.end(), [&](const Aabb& o) {
+           return (p_W - p_W.cwiseMax(o.min_W).cwiseMin(o.max_W)).norm() < radius_m;
+         });
+}
+
 struct Scene {
   std::string name;
   int count{}, none{}, parts{}, corners{};
@@ -108,10 +117,9 @@ void fly(const bench::Problem& p, const PlanResult& planned, Smoother& sut, Scen
   scene.ratio.push_back(t.duration_s() /
                         (length_m / kLimits.speed_mps + kLimits.speed_mps / kLimits.acceleration_mps2));
   check(t, scene);
-  std::uint64_t lookups = 0;
   for (double s = 0.0; s < t.duration_s(); s += 0.01)
     scene.collisions +=
-        p.view.is_free(Aabb::around(t.at_s(s).p_W, request.radius_m - 0.02), lookups) ? 0U : 1U;
+        is_ball_apart(p.view, t.at_s(s).p_W, request.radius_m - 0.02) ? 0U : 1U;
 }
 
 }  // namespace
