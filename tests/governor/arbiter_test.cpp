@@ -37,6 +37,24 @@ TEST(Arbiter, IsTotalAndMonotoneOnAllSubsetsAndPhases) {
   for (std::size_t a = 0; a < kActionCount; ++a) EXPECT_GT(seen[a], 0) << to_string(static_cast<Action>(a));
 }
 
+TEST(Arbiter, TakesAPhaseThatIsNoneForKilled) {
+  for (const unsigned none : {8U, 9U, 255U})
+    EXPECT_EQ(arbitrate(0, static_cast<Phase>(none)), arbitrate(0, Phase::kKilled)) << none;
+  EXPECT_EQ(arbitrate(0, Phase::kKilled), Action::kKill);
+}
+
+TEST(Arbiter, BeginsThePhaseOfItsActionButStaysOnTheGround) {
+  for (const Phase phase : kPhases) {
+    const bool ground = phase == Phase::kGround;
+    EXPECT_EQ(phase_after(Action::kGoOn, phase), phase);
+    EXPECT_EQ(phase_after(Action::kHold, phase), ground ? phase : Phase::kHold);
+    EXPECT_EQ(phase_after(Action::kReturn, phase), ground ? phase : Phase::kReturn);
+    EXPECT_EQ(phase_after(Action::kLand, phase), ground ? phase : Phase::kLand);
+    EXPECT_EQ(phase_after(Action::kTerminate, phase), Phase::kTerminated);
+    EXPECT_EQ(phase_after(Action::kKill, phase), Phase::kKilled);
+  }
+}
+
 TEST(Arbiter, NeverReplacesASaferActionInAnyOrderOfAnyPairOfSets) {
   for (const Phase start : kPhases) {
     for (unsigned c1 = 0; c1 < kConditionCount; ++c1) {
