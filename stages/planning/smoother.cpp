@@ -119,9 +119,9 @@ class Tries {
 bool is_rest_free(const MapView& view, const PolynomialSegment& segment, double first_s, double radius_m,
                   std::uint64_t& lookups, double& at_s) noexcept;
 
-/// The straight pieces of the course, as whoever found the path checks them: the boxes along one cover what the vehicle sweeps,
-/// and no more. Around any other chord that slants there is more than that: where a piece touches what is not free at
-/// two corners, as paths over a lattice do, no chord across that place is free, however short.
+/// The straight pieces of the course, as whoever found the path checks them. Where the box along a piece touches what is not free
+/// at two corners, as paths over a lattice do, the box around another chord across that place does not fit; the ball does, if what is
+/// not free are whole cells of the view.
 class StraightPieces {
  public:
   StraightPieces(const Course& course, double radius_m) noexcept : course_(course), radius_m_(radius_m) {}
