@@ -62,7 +62,11 @@ struct Beginning {
 class Fitter {
  public:
   Fitter(const Course& course, const MotionLimits& limits, Trajectory& out, SegmentParts& part) noexcept
-      : course_(course), limits_(limits), out_(out), part_(part) {}
+      : course_(course),
+        limits_(limits),
+        faster_mps2_(std::min(limits.acceleration_mps2, limits.speeding_up_mps2)),
+        out_(out),
+        part_(part) {}
 
   CurveFit fit(const TrajectoryPoint& start) noexcept;
 
@@ -94,6 +98,7 @@ class Fitter {
 
   const Course& course_;
   const MotionLimits& limits_;
+  double faster_mps2_;  ///< Where the speed goes up.
   Trajectory& out_;
   SegmentParts& part_;
   TrajectoryPoint at_;  ///< Where the curve is so far.
@@ -121,7 +126,7 @@ Leg Fitter::leg_between(const Vector3& from_W, const Vector3& to_W) const noexce
   const double rise = std::fabs(leg.direction.z());
   leg.limit_mps = rise * limits_.speed_mps > vertical_mps ? vertical_mps / rise : limits_.speed_mps;
   leg.braking = limits_along(way, limits_.acceleration_mps2);
-  leg.faster = limits_along(way, std::min(limits_.acceleration_mps2, limits_.speeding_up_mps2));
+  leg.faster = limits_along(way, faster_mps2_);
   return leg;
 }
 
@@ -172,9 +177,7 @@ void Fitter::limit_forwards() noexcept {
 
 ChangeLimits Fitter::first_change(const TrajectoryPoint& start, const Vector3& v_W) const noexcept {
   const bool speeds_up = v_W.norm() > start.v_W.norm();
-  const double most_mps2 =
-      speeds_up ? std::min(limits_.acceleration_mps2, limits_.speeding_up_mps2) : limits_.acceleration_mps2;
-  return limits_along(v_W - start.v_W, most_mps2);
+  return limits_along(v_W - start.v_W, speeds_up ? faster_mps2_ : limits_.acceleration_mps2);
 }
 
 /// The direction of the leg depends on where the change ends, and that on the direction: a few rounds.
