@@ -18,6 +18,8 @@ constexpr double kAwareV0_m3 = 60e3;
 constexpr double kAwareV1_m3 = 1e6;
 constexpr double kRemembered_m3 = 6e3;
 constexpr double kStaticSpeed_mps = 0.5;
+constexpr double kTight =
+    3.0;  // published cells: where the space asks for less than that, a narrow way is one
 
 double sum(const core::StageArray<double>& stage_s) noexcept {
   double total_s = 0.0;
@@ -96,6 +98,7 @@ const char* to_string(Aim aim) noexcept { return aim == Aim::kEnergy ? "energy" 
 Status Policy::validate() const noexcept {
   const bool times_ok = shortest > Nanos{0} && longest >= shortest && longest_budget >= longest;
   const bool precision_ok = core::within(failures_until_finer, 1, 100) &&
+                            core::within(narrow_tries, 0, 100) &&
                             core::within(coarser_levels_per_decision, 1, kPrecisionLevels) &&
                             core::within(cells_to_obstacle, 1.0, 100.0);
   const bool volume_ok = core::above(planner_share, 0.0, 1.0) && core::above(fine_volume_m3, 0.0, 1e9);
@@ -229,8 +232,10 @@ double Governor::least_s(const Task& task, int level) const noexcept {
 /// either side of a gap: a gap of width g loses up to four cells, so it is passable for certain on cells of
 ///   (g - width) / 4
 /// and `cells_to_obstacle` cells must fit between the vehicle and the nearest obstacle. Then the policy:
-/// coarser only step by step, finer than 0.3 m only after failures, on narrow ways, and one level where the space asks for less than
-/// 0.6 m and the shortest decision has time for it; at most 0.6 m near the goal and on the climb.
+/// coarser only step by step, finer than 0.3 m only after failures, on ways that are narrow for what stands there and not for holes
+/// of the cameras, and one level where the space asks for less than 0.6 m and the shortest decision has time for it; at most
+/// 0.6 m near the goal and on the climb. Failures ask for one level finer each; two at the finest, one with each radius of the
+/// planner, and it begins anew: where precision was not what lacked, quick looks fill holes sooner.
 int Governor::asked_level(const Task& task, Decision& d) const noexcept {
   const Policy& policy = config_.policy;
   const double gap_cell_m = 0.25 * (task.profile.gap_average_m - config_.vehicle_width_m);
@@ -241,7 +246,12 @@ int Governor::asked_level(const Task& task, Decision& d) const noexcept {
   const bool costs_nothing =
       d.demand_m < 2.0 * kPublishedCell_m && least_s(task, fine) <= seconds(policy.shortest);
   level = costs_nothing ? fine : std::max(level, published_level());
-  level = task.situation.narrow ? 0 : std::max(level - finer_levels(task.situation), 0);
+  const bool tight =
+      d.demand_m < kTight * kPublishedCell_m || least_s(task, 0) <= 2.0 * seconds(policy.shortest);
+  if (task.situation.narrow && tight && task.situation.failures < policy.narrow_tries)
+    level = 0;
+  else
+    level -= std::min(finer_levels(task.situation) % (level + 2), level);
   if (near_goal(task.situation) || task.situation.surveying)
     level = std::min(level, config_.lattice.coarsest_level_within(2.0 * kPublishedCell_m));
   return level;

@@ -19,6 +19,7 @@ TEST(GovernorConfigDeathTest, OnlyValidOnesAreMade) {
        {"longest", [](Config& c) { c.policy.longest = c.policy.shortest - Nanos{1}; }},
        {"longest budget", [](Config& c) { c.policy.longest_budget = c.policy.longest - Nanos{1}; }},
        {"failures", [](Config& c) { c.policy.failures_until_finer = 0; }},
+       {"narrow tries", [](Config& c) { c.policy.narrow_tries = -1; }},
        {"coarser levels", [](Config& c) { c.policy.coarser_levels_per_decision = 0; }},
        {"cells", [](Config& c) { c.policy.cells_to_obstacle = 0.0; }},
        {"share", [](Config& c) { c.policy.planner_share = 1.1; }},

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "core/random/counter_rng.hpp"
 #include "tests/support/names.hpp"
@@ -195,6 +196,7 @@ TEST(Governor, FineCellsAreForWhatIsNearAndEndInTime) {
   situation.narrow = true;
   SpaceProfile p = open_space(25.0, 0.0);
   p.sensor_volume_m3 = 18e3;
+  p.closest_obstacle_m = 1.2;
   const Decision near = Governor(config).decide(p, situation);
   EXPECT_EQ(near.point.p0_level, 0);
   EXPECT_LE(seconds(near.point.deadline), 0.8);
@@ -203,6 +205,41 @@ TEST(Governor, FineCellsAreForWhatIsNearAndEndInTime) {
   const Decision all = Governor(config).decide(p, situation);
   EXPECT_EQ(all.point.p0_level, 0);
   EXPECT_GT(seconds(all.point.deadline), 5.0);
+}
+
+/// Ways are narrow beside holes of a camera too: nothing stands near, and precise looks are not what lacks.
+TEST(Governor, HolesDoNotAskForTheFinestCells) {
+  GovernorConfig config = paper_config(Design::kAware);
+  config.lattice = {0.1};
+  config.model = models_of(core::on_lattice(core::paper_profile(), config.lattice));
+  const SpaceProfile open = open_space(25.0, 0.0);
+  const auto level = [&](double closest_obstacle_m, int failures) {
+    Governor sut(config);
+    for (int i = 0; i < kPrecisionLevels; ++i) (void)sut.decide(open, {0, 100.0});  // as coarse as it gets
+    Situation situation{failures, 100.0};
+    situation.narrow = true;
+    SpaceProfile p = open;
+    p.closest_obstacle_m = closest_obstacle_m;
+    return sut.decide(p, situation).point.p0_level;
+  };
+  EXPECT_GT(level(6.0, 0), 1);
+  EXPECT_EQ(level(1.5, 0), 0);
+  EXPECT_EQ(level(1.5, config.policy.narrow_tries - 1), 0);
+  EXPECT_GT(level(1.5, config.policy.narrow_tries), 0);
+}
+
+/// Finer with each failure, twice at the finest (once with each radius of the planner), then quickly again.
+TEST(Governor, FailuresGoThroughTheLevelsAgainAndAgain) {
+  GovernorConfig config = paper_config(Design::kAware);
+  config.model = models_of(core::paper_profile());
+  const SpaceProfile p = open_space(25.0, 0.0);
+  std::vector<int> levels;
+  for (int failures = 0; failures < 12; ++failures) {
+    Governor fresh(config);
+    for (int i = 0; i < kPrecisionLevels; ++i) (void)fresh.decide(p, {0, 100.0});  // as coarse as it gets
+    levels.push_back(fresh.decide(p, {failures, 100.0}).point.p0_level);
+  }
+  EXPECT_EQ(levels, (std::vector<int>{3, 3, 2, 1, 0, 0, 3, 2, 1, 0, 0, 3}));
 }
 
 /// Between trees, gaps of 3.4 m on the average (asked for: 0.45 m): on a board that has time for them, cells of 0.15 m.
