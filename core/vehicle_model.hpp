@@ -97,7 +97,7 @@ inline constexpr std::array<VehicleKey, 28> kVehicleKeys = [] {
     {"limits", "climb_mps", &V::climb_mps, 0.2, 30.0, "fastest climb"},
     {"limits", "descent_mps", &V::descent_mps, 0.2, 30.0, "fastest descent"},
     {"limits", "yaw_rate_radps", &V::yaw_rate_radps, 0.05, 10.0, "fastest turn about the vertical"},
-    {"limits", "finest_cell_m", &V::finest_cell_m, 0.05, 0.3, "edge of the map's finest cells, for the design aware: smaller ones let it through narrower gaps, and cost more", kPublishedCell_m},
+    {"limits", "finest_cell_m", &V::finest_cell_m, 0.05, 0.3, "edge of the map's finest cells, for the design aware: smaller ones let it through narrower gaps, and cost more; never less than a 17th of body.radius_m and slow_error_m together", kPublishedCell_m},
     {"limits", "thinnest_m", &V::thinnest_m, 0.005, 1.0, "the thinnest pole or wire that it must not fly into", 0.02},
   }};
 }();

@@ -40,11 +40,12 @@ stages::WayMemory::Config way_config(const FlightConfig& config) noexcept {
   using stages::WayMemory;
   WayMemory::Config ways{config.bounds_W, slow_radius_m(config.vehicle), lattice_of(config).finest_m,
                          config.fence, config.vehicle.radius_m};
-  // A large world in larger cells: its surfaces would take more blocks than there are.
+  // A large world in larger cells, for its surfaces would take more blocks than there are; a wide vehicle, too.
   constexpr double kPositionsPerBlock = 8.0;
   const bool is_large =
       WayMemory::positions(ways) > kPositionsPerBlock * static_cast<double>(ways.max_blocks);
-  if (is_large && ways.finest_m < kPublishedCell_m) ways.finest_m *= 2.0;
+  const bool is_wide = ways.radius_m > (WayMemory::kWidest + 1e-7) * ways.finest_m;
+  if ((is_large && ways.finest_m < kPublishedCell_m) || is_wide) ways.finest_m *= 2.0;
   return ways;
 }
 
@@ -106,7 +107,9 @@ governor::GovernorConfig governor_config(const FlightConfig& config) noexcept {
 
 PrecisionLattice lattice_of(const FlightConfig& config) noexcept {
   const bool aware = config.design == governor::Design::kAware;
-  return aware ? PrecisionLattice{config.vehicle.finest_cell_m} : PrecisionLattice{};
+  // The memory of ways takes cells of twice the finest at most.
+  const double least_m = slow_radius_m(config.vehicle) / (2.0 * stages::WayMemory::kWidest);
+  return aware ? PrecisionLattice{std::max(config.vehicle.finest_cell_m, least_m)} : PrecisionLattice{};
 }
 
 Aabb map_bounds_W(const FlightConfig& config) noexcept {

@@ -55,10 +55,14 @@ Extent extent_of(const WayMemory::Config& config) noexcept {
   return e;
 }
 
+int width(const WayMemory::Config& config) noexcept {
+  return static_cast<int>(std::ceil(2.0 * config.radius_m / config.finest_m - 1e-6));
+}
+
 /// One cell less on either side than plans take, for that much surfaces are off, and no less than the vehicle.
-int narrow_width(const WayMemory::Config& config, int width) noexcept {
+int narrow_width(const WayMemory::Config& config) noexcept {
   const int body = static_cast<int>(std::ceil(2.0 * config.body_m / config.finest_m - 1e-6));
-  return std::clamp(body, std::max(width - 2, 1), width);
+  return std::clamp(body, std::max(width(config) - 2, 1), width(config));
 }
 
 /// Of the square inside the vehicle's circle, seen from above, so many cells as surely fit into it: however a gap lies.
@@ -72,7 +76,8 @@ int core_width(const WayMemory::Config& config) noexcept {
 double WayMemory::positions(const Config& config) noexcept { return extent_of(config).blocks; }
 
 bool WayMemory::fits(const Config& config) noexcept {
-  return positions(config) <= static_cast<double>(kMaxPositions);
+  return positions(config) <= static_cast<double>(kMaxPositions) &&
+         config.radius_m <= (kWidest + 1e-7) * config.finest_m && config.body_m <= config.radius_m;
 }
 
 std::size_t WayMemory::arena_bytes(const Config& config) noexcept {
@@ -84,8 +89,8 @@ std::size_t WayMemory::arena_bytes(const Config& config) noexcept {
 
 WayMemory::WayMemory(const Config& config, core::Arena& arena) noexcept
     : config_((ROBORUN_ASSERT(fits(config)), config)),
-      width_(static_cast<int>(std::ceil(2.0 * config.radius_m / config.finest_m - 1e-6))),
-      narrow_width_(narrow_width(config, width_)),
+      width_(width(config)),
+      narrow_width_(narrow_width(config)),
       core_width_(core_width(config)),
       position_(arena.take<Position>(static_cast<std::size_t>(extent_of(config).blocks), "way positions")),
       position_pool_(arena.last_pool()),

@@ -37,7 +37,9 @@ class WayMemory final : public Ways {
   };
   /// Blocks of the world.
   [[nodiscard]] static double positions(const Config& config) noexcept;
-  /// False for worlds of more than 262,144 blocks.
+  /// Radius of the largest vehicle, in cells: 17 of them across, see find_places().
+  static constexpr double kWidest = 8.5;
+  /// False for worlds of more than 262,144 blocks, a radius of more than kWidest cells, or less than body_m.
   [[nodiscard]] static bool fits(const Config& config) noexcept;
   [[nodiscard]] static std::size_t arena_bytes(const Config& config) noexcept;
   /// Preconditions, asserted: fits(config), and the arena has arena_bytes().

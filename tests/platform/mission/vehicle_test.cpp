@@ -46,6 +46,24 @@ TEST_P(ShippedVehicle, ReachesItsGoalAndKeepsNearItsReference) {
   EXPECT_LE(r.max_velocity_mps, 1.15 * vehicle.model.speed_mps);
 }
 
+/// Wider than a block of the memory of ways has cells.
+TEST(WideVehicle, Arrives) {
+  const sitl::World world = sitl::load_world(std::string(ROBORUN_TEST_DATA) + "/worlds/two_pillars.toml", {});
+  for (const double radius_m : {0.9, 2.0}) {
+    vehicle::Vehicle vehicle = vehicle::load_vehicle("paper");
+    vehicle.model.radius_m = radius_m;
+    MissionConfig config;
+    set_vehicle(config, vehicle);
+    const board::Profile board = board::slower(board::paper(), 0.15);
+    config.flight.costs = board.costs;
+    config.flight.model = board.model;
+    config.judge.time_limit_s = 300.0;
+    const report::MissionResult r = fly_mission(world, config, {}).result;
+    EXPECT_EQ(r.reason, "reached_goal") << radius_m;
+    EXPECT_FALSE(r.collided);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(All, ShippedVehicle, ::testing::ValuesIn(vehicle::shipped_vehicles()),
                          [](const auto& p) { return p.param; });
 

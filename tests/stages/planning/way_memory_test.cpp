@@ -62,6 +62,22 @@ class WayMemoryTest : public ::testing::Test {
   Vector3 start_W_{0, 0, 5}, goal_W_{80, 0, 5};
 };
 
+TEST_F(WayMemoryTest, IsForVehiclesOfUpToSeventeenCells) {
+  config_.finest_m = 0.1;
+  config_.radius_m = 0.86;
+  EXPECT_FALSE(WayMemory::fits(config_));
+  config_.radius_m = 0.85;
+  config_.bounds_W = {Vector3(-5, -10, 1.5), Vector3(20, 10, 10)};
+  goal_W_ = Vector3(18, 0, 5);
+  ASSERT_TRUE(WayMemory::fits(config_));
+  make();
+  box(5, -10, 5.3, 3);
+  for (int look = 0; look < 10; ++look) ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  EXPECT_GT(farthest_side_m(), 3.0);
+  config_.body_m = 0.9;
+  EXPECT_FALSE(WayMemory::fits(config_)) << "a body without room";
+}
+
 TEST_F(WayMemoryTest, OpenSpaceIsStraightOnAndUnknownSpaceCountsTwice) {
   make();
   ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
