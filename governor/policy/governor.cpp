@@ -232,10 +232,11 @@ double Governor::least_s(const Task& task, int level) const noexcept {
 /// either side of a gap: a gap of width g loses up to four cells, so it is passable for certain on cells of
 ///   (g - width) / 4
 /// and `cells_to_obstacle` cells must fit between the vehicle and the nearest obstacle. Then the policy:
-/// coarser only step by step, finer than 0.3 m only after failures, on ways that are narrow for what stands there and not for holes
-/// of the cameras, and one level where the space asks for less than 0.6 m and the shortest decision has time for it; at most
-/// 0.6 m near the goal and on the climb. Failures ask for one level finer each; two at the finest, one with each radius of the
-/// planner, and it begins anew: where precision was not what lacked, quick looks fill holes sooner.
+/// coarser only step by step, finer than 0.3 m only after failures, on narrow ways, and one level where the space asks for less than
+/// 0.6 m and the shortest decision has time for it; at most 0.6 m near the goal and on the climb. Failures ask for one level finer
+/// each. Where the finest cells take more than two of the shortest decisions, they are for ways that are narrow for what stands
+/// there, not for holes of the cameras, and failures begin anew after two at the finest, one with each radius of the planner: where
+/// precision was not what lacked, quick looks fill holes sooner.
 int Governor::asked_level(const Task& task, Decision& d) const noexcept {
   const Policy& policy = config_.policy;
   const double gap_cell_m = 0.25 * (task.profile.gap_average_m - config_.vehicle_width_m);
@@ -246,12 +247,13 @@ int Governor::asked_level(const Task& task, Decision& d) const noexcept {
   const bool costs_nothing =
       d.demand_m < 2.0 * kPublishedCell_m && least_s(task, fine) <= seconds(policy.shortest);
   level = costs_nothing ? fine : std::max(level, published_level());
-  const bool tight =
-      d.demand_m < kTight * kPublishedCell_m || least_s(task, 0) <= 2.0 * seconds(policy.shortest);
-  if (task.situation.narrow && tight && task.situation.failures < policy.narrow_tries)
+  const int finer = finer_levels(task.situation);
+  const bool cheap = least_s(task, 0) <= 2.0 * seconds(policy.shortest);
+  const bool tight = d.demand_m < kTight * kPublishedCell_m && task.situation.failures < policy.narrow_tries;
+  if (task.situation.narrow && (cheap || tight))
     level = 0;
   else
-    level -= std::min(finer_levels(task.situation) % (level + 2), level);
+    level -= std::min(cheap ? finer : finer % (level + 2), level);
   if (near_goal(task.situation) || task.situation.surveying)
     level = std::min(level, config_.lattice.coarsest_level_within(2.0 * kPublishedCell_m));
   return level;

@@ -43,7 +43,7 @@ struct Policy {
   /// takes longer. >= shortest.
   Nanos longest{200'000'000};
   Nanos longest_budget{15'000'000'000};  ///< The authors' cap: what a standing vehicle is given. >= longest.
-  /// From this many failed decisions on, one level finer for each; after two at the finest anew. [1, 100]
+  /// From this many failed decisions on, one level finer for each; after two at the finest anew, if those are dear. [1, 100]
   int failures_until_finer{2};
   /// So many decisions may fail on a narrow way before its finest cells count as one try among others. [0, 100]
   int narrow_tries{6};

@@ -106,6 +106,53 @@ TEST(TrajectoryBudget, IsNeverMoreOptimisticThanADenseReferenceAndAtMostAMinorFr
   EXPECT_LT(worst_pessimism_s, 2.5e-3);
 }
 
+/// What the closed form is said to be, by looking: coarsely, and then ever closer around the least.
+double least_by_looking_s(const TrajectoryOutlook& a, const TrajectoryOutlook& b, const StoppingModel& model,
+                          double longest_s) {
+  const auto at = [&](double share) {
+    const double v = a.speed_mps + share * (b.speed_mps - a.speed_mps);
+    const double rest_m = a.visible_m + share * (b.visible_m - a.visible_m) - model.distance_m(v);
+    const double here_s = rest_m <= 0.0 ? 0.0 : v > 0.0 ? std::min(rest_m / v, longest_s) : longest_s;
+    return a.time_s + share * (b.time_s - a.time_s) + here_s;
+  };
+  double from = 0.0, to = 1.0, best = 0.0;
+  for (const int steps : {2000, 40, 40, 40, 40}) {
+    const double step = (to - from) / steps;
+    best = from;
+    for (int i = 1; i <= steps; ++i)
+      if (at(from + step * i) < at(best)) best = from + step * i;
+    from = std::max(best - step, 0.0);
+    to = std::min(best + step, 1.0);
+  }
+  return std::min(at(best), longest_s);
+}
+
+TEST(TrajectoryBudget, IsTheLeastOfASegmentWhereverItLies) {
+  core::CounterRng rng(5);
+  std::array<int, 3> where{};  // at its begin, at its end, between
+  for (int n = 0; n < 5000; ++n) {
+    StoppingModel model{rng.uniform(0.01, 0.4), rng.uniform(0.0, 1.0), rng.uniform(-1.0, 1.0)};
+    if (n % 5 == 0) model.quadratic_s2pm = 0.0;
+    if (n % 7 == 0) model.linear_s = 0.0;
+    std::array<TrajectoryOutlook, 2> w{};
+    w[0] = {rng.uniform(0.0, 2.0), rng.uniform(0.0, 12.0), rng.uniform(-2.0, 30.0)};
+    w[1] = {w[0].time_s + rng.uniform(0.05, 8.0), rng.uniform(0.0, 12.0), rng.uniform(-2.0, 30.0)};
+    if (n % 11 == 0) w[1].speed_mps = w[0].speed_mps;
+    if (n % 13 == 0) w[1].visible_m = w[0].visible_m;
+    if (n % 17 == 0) (n % 2 == 0 ? w[0] : w[1]).speed_mps = 0.0;
+    const double least_s = least_by_looking_s(w[0], w[1], model, 15.0);
+    const double exact_s = seconds(trajectory_budget(w, model, kLimits));
+    ASSERT_NEAR(exact_s, std::clamp(least_s, 1e-3, 15.0), 2e-6)
+        << n << ": " << w[0].time_s << ' ' << w[0].speed_mps << ' ' << w[0].visible_m << ", " << w[1].time_s
+        << ' ' << w[1].speed_mps << ' ' << w[1].visible_m << "; " << model.quadratic_s2pm << ' '
+        << model.linear_s << ' ' << model.constant_m;
+    const double begin_s = least_by_looking_s(w[0], w[0], model, 15.0);
+    const double end_s = least_by_looking_s(w[1], w[1], model, 15.0);
+    ++where[exact_s > begin_s - 2e-6 ? 0 : exact_s > end_s - 2e-6 ? 1 : 2];
+  }
+  for (const int count : where) EXPECT_GT(count, 200);
+}
+
 TEST(TrajectoryBudget, CountsPartOfTheFirstSegment) {
   // One long segment at constant speed 4 m/s: Eq. 1 at its start gives (10 - 2.095) / 4 = 1.976 s, less than
   // the segment's 5 s. Whole segments only (as printed) would give 0.
