@@ -21,7 +21,8 @@ struct AutopilotChoice {
 [[nodiscard]] std::optional<AutopilotKind> autopilot_of(const char* option, const std::string& name);
 [[nodiscard]] const char* to_string(AutopilotKind kind) noexcept;
 
-/// The vehicle as this autopilot flies and stops it, for the plans. Limits: the lesser of both. Its stop: whichever of these is
+/// The vehicle as this autopilot flies and stops it, for the plans. Limits: the lesser of both. Its errors: those of the
+/// autopilot's loops, or the vehicle's own if they are larger. Its stop: whichever of these is
 /// longer, at every speed up to its fastest,
 ///  - the stop that its trajectories end in, within those limits;
 ///  - the autopilot's own after silence: v (silence + delay + a / 2j) + v^2 / 2a, the link's delay and the period of the
