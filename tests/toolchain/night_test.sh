@@ -53,6 +53,11 @@ night = importlib.util.module_from_spec(importlib.util.spec_from_loader("night",
 loader.exec_module(night)
 assert [round(night.bound(k, 1.0), 2) for k in range(3)] == [3.0, 4.74, 6.3], [night.bound(k, 1.0) for k in range(3)]
 assert night.drawn(1, 7) == night.drawn(1, 7) != night.drawn(2, 7)
+made = [flight for flight in (night.drawn(1, number) for number in range(100)) if "made" in flight]
+assert 30 < len(made) < 70
+for flight in made:
+    file = night.tomllib.loads(night.vehicle_file(flight))
+    assert [file["body"]["radius_m"], file["limits"]["finest_cell_m"], file["limits"]["speed_mps"]] == list(flight["made"].values())
 PY
 [[ $failed -eq 0 ]] && echo "a night is counted, goes on and says what was bad"
 exit $failed
