@@ -30,8 +30,8 @@ struct BudgetLimits {
 /// form
 ///     budget = min over s >= 0 of (s + max(b(s), 0))
 /// at no earlier instant of following the trajectory does the remaining budget run out. Whole segments are
-/// not needed, and nothing is lost after the last way-point. Within a segment the minimum is at one of at
-/// most nine points in closed form. No sample: Eq. 1 is for the caller; gives the shortest.
+/// not needed, and nothing is lost after the last way-point. Within a segment the minimum is at one of
+/// four points in closed form. No sample: Eq. 1 is for the caller; gives the shortest, as do NaN and times that fall.
 /// Precondition, asserted: limits.validate() is kOk. RT-safe: O(samples).
 [[nodiscard]] Nanos trajectory_budget(std::span<const TrajectoryOutlook> outlook, const StoppingModel& model,
                                       const BudgetLimits& limits) noexcept;

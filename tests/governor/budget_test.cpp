@@ -163,8 +163,34 @@ TEST(TrajectoryBudget, CountsPartOfTheFirstSegment) {
 
 TEST(TrajectoryBudget, RefusesToGuess) {
   EXPECT_EQ(trajectory_budget({}, kRoborunStopping, kLimits), kLimits.shortest);
-  const std::array<TrajectoryOutlook, 2> w{{{0.0, 1.0, 10.0}, {1.0, kNan, 10.0}}};
-  EXPECT_EQ(trajectory_budget(w, kRoborunStopping, kLimits), kLimits.shortest);
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const std::array<TrajectoryOutlook, 3> sound{{{0.0, 1.0, 10.0}, {2.0, 1.0, 10.0}, {4.0, 1.0, 10.0}}};
+  ASSERT_GT(seconds(trajectory_budget(sound, kRoborunStopping, kLimits)), 5.0);
+  for (std::size_t i = 0; i < sound.size(); ++i) {
+    const auto with = [&](double TrajectoryOutlook::*field, double value) {
+      auto w = sound;
+      w[i].*field = value;
+      return trajectory_budget(w, kRoborunStopping, kLimits);
+    };
+    EXPECT_EQ(with(&TrajectoryOutlook::time_s, kNan), kLimits.shortest) << i;
+    EXPECT_EQ(with(&TrajectoryOutlook::time_s, kInfinity), kLimits.shortest) << i;
+    EXPECT_EQ(with(&TrajectoryOutlook::speed_mps, kNan), kLimits.shortest) << i;
+    EXPECT_EQ(with(&TrajectoryOutlook::visible_m, kNan), kLimits.shortest) << i;
+  }
+  const std::array<TrajectoryOutlook, 2> back{{{1.0, 1.0, 10.0}, {0.5, 1.0, 10.0}}};
+  EXPECT_EQ(trajectory_budget(back, kRoborunStopping, kLimits), kLimits.shortest);
+  const std::array<TrajectoryOutlook, 2> at_once{{{0.0, 1.0, 10.0}, {0.0, 1.0, 10.0}}};
+  EXPECT_GT(seconds(trajectory_budget(at_once, kRoborunStopping, kLimits)), 5.0);
+}
+
+TEST(TrajectoryBudget, OfAVehicleThatStandsIsTheLongestWhereItSeesAnything) {
+  const auto standing = [](double speed_mps, double visible_m) {
+    const std::array<TrajectoryOutlook, 1> w{{{0.0, speed_mps, visible_m}}};
+    return trajectory_budget(w, kRoborunStopping, kLimits);
+  };
+  EXPECT_EQ(standing(0.0, 0.0), kLimits.shortest);
+  EXPECT_EQ(standing(0.0, 0.1), kLimits.longest);
+  EXPECT_EQ(standing(-1.0, 0.1), kLimits.longest);
 }
 
 }  // namespace
