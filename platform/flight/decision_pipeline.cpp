@@ -19,9 +19,7 @@ constexpr double kCornerRoom_m = 0.25;
 constexpr double kAtRest_mps = 0.05;
 constexpr double kLeaving_mps = 0.5;
 constexpr double kTooFast = 1.5;
-constexpr double kReserve = 1.25;  // of the time for planner and smoother, see hasten()
-constexpr double kSearches = 3.0;  // of find_trajectory(), one of which is predicted
-constexpr int kSpareFrames = 4;
+constexpr double kForgets = 0.9;      // what the planner took, from one decision to the next
 constexpr double kSlowEnough = 1.05;  // of the slow speed: what trajectories keep to
 /// So many pixels of a decision's images show something thin where poles or wires are: 40 to 900 in worlds of them. In environment
 /// 14 they are at most 3 (clean cameras), 23 (d455).
@@ -326,17 +324,6 @@ void DecisionPipeline::leave(core::StageBudget& budget, DecisionOutput& out) noe
   out.smoother_status = draft_.leaves ? Status::kOk : Status::kNoPath;
 }
 
-void DecisionPipeline::hasten(const DecisionInput& in, DecisionOutput& out) const noexcept {
-  if (in.climbing || out.decision.source == governor::BudgetSource::kFixed) return;
-  const double left_s = kSearches * out.decision.predicted_s[core::StageId::kPlanner] +
-                        out.decision.predicted_s[core::StageId::kSmoother];
-  const Nanos needed = out.latency + from_seconds(kReserve * left_s);
-  const Nanos whole = config_.minor_frame * (needed / config_.minor_frame + kSpareFrames);
-  const MonotonicTime stands = in.committed->start_time + from_seconds(in.committed->duration_s());
-  if (in.now + whole < stands) return;
-  out.decision.point.deadline = std::min(out.decision.point.deadline, whole);
-}
-
 void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexcept {
   draft_.begun = false;
   hasten(in, out);
@@ -390,6 +377,8 @@ void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noex
     if (config_.turns) look_on(in, budget, out);
     give_way(in, budget, out);
     charge(core::StageId::kPlanner, draft_.planner_work, out);
+    double& searched_s = searched_s_[static_cast<std::size_t>(out.decision.point.p1_level)];
+    searched_s = std::max(seconds(out.cost[core::StageId::kPlanner]), kForgets * searched_s);
     charge(core::StageId::kSmoother, draft_.smoother_work, out);
     choose(in, out);
   }

@@ -225,6 +225,7 @@ class DecisionPipeline {
       MonotonicTime::min();  ///< Start of the last trajectory that leaves a place without room.
   MonotonicTime dodges_at_ = MonotonicTime::min();  ///< The same of the last one that goes aside.
   Draft draft_;
+  std::array<double, kPrecisionLevels> searched_s_{};  ///< By level of p1: what the planner took lately.
   std::optional<Vector3> look_W_{};  ///< What it looks at while it stands without a way, or steps back.
   MonotonicTime blocked_since_{};    ///< Standing without a way, and the looks so far led nowhere.
   MonotonicTime back_until_{};       ///< It steps back to look: nothing else is planned.

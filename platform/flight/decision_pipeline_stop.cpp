@@ -1,4 +1,6 @@
-// Where an autopilot stops a vehicle that hears no commands any more.
+// Stops: where an autopilot's leads when the vehicle hears no commands any more, and how soon a vehicle that stands decides.
+#include <algorithm>
+
 #include "platform/flight/decision_pipeline.hpp"
 
 namespace roborun::flight {
@@ -24,6 +26,22 @@ bool DecisionPipeline::stops_free(const Trajectory& trajectory, const stages::Ma
     if (!stages::is_trajectory_free(view, stop, 0.0, config_.vehicle.radius_m, work.units)) return false;
   }
   return true;
+}
+
+void DecisionPipeline::hasten(const DecisionInput& in, DecisionOutput& out) const noexcept {
+  constexpr double kReserve = 1.25;  // of the time for planner and smoother
+  constexpr double kSearches = 3.0;  // of find_trajectory(), one of which is predicted
+  constexpr int kSpareFrames = 4;
+  if (in.climbing || out.decision.source == governor::BudgetSource::kFixed) return;
+  // Where little is in view a search is predicted to take nothing.
+  const double left_s = std::max(kSearches * out.decision.predicted_s[core::StageId::kPlanner],
+                                 searched_s_[static_cast<std::size_t>(out.decision.point.p1_level)]) +
+                        out.decision.predicted_s[core::StageId::kSmoother];
+  const Nanos needed = out.latency + from_seconds(kReserve * left_s);
+  const Nanos whole = config_.minor_frame * (needed / config_.minor_frame + kSpareFrames);
+  const MonotonicTime stands = in.committed->start_time + from_seconds(in.committed->duration_s());
+  if (in.now + whole < stands) return;
+  out.decision.point.deadline = std::min(out.decision.point.deadline, whole);
 }
 
 }  // namespace roborun::flight
