@@ -26,8 +26,10 @@ stages::BrickMap::Config brick_config(const Aabb& map_bounds_W, const ImageLimit
   config.thinnest_m = images.thinnest_m;
   config.lattice = images.lattice;
   if (config.validate() != Status::kOk) {
-    throw InputError(fmt::format("map: the world is too large for the map: at most 4 million bricks of {} m",
-                                 stages::kBrickCells * images.lattice.finest_m));
+    throw InputError(
+        fmt::format("map: the world is too large for the map: at most 4 million bricks of {} m; "
+                    "must have smaller bounds, or the vehicle a larger limits.finest_cell_m",
+                    stages::kBrickCells * images.lattice.finest_m));
   }
   return config;
 }
