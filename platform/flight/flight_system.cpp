@@ -44,7 +44,7 @@ stages::WayMemory::Config way_config(const FlightConfig& config) noexcept {
   constexpr double kPositionsPerBlock = 8.0;
   const bool is_large =
       WayMemory::positions(ways) > kPositionsPerBlock * static_cast<double>(ways.max_blocks);
-  const bool is_wide = ways.radius_m > (WayMemory::kWidest + 1e-7) * ways.finest_m;
+  const bool is_wide = WayMemory::cells_across(ways) > WayMemory::kMostAcross;
   if ((is_large && ways.finest_m < kPublishedCell_m) || is_wide) ways.finest_m *= 2.0;
   return ways;
 }
@@ -108,7 +108,7 @@ governor::GovernorConfig governor_config(const FlightConfig& config) noexcept {
 PrecisionLattice lattice_of(const FlightConfig& config) noexcept {
   const bool aware = config.design == governor::Design::kAware;
   // The memory of ways takes cells of twice the finest at most.
-  const double least_m = slow_radius_m(config.vehicle) / (2.0 * stages::WayMemory::kWidest);
+  const double least_m = slow_radius_m(config.vehicle) / stages::WayMemory::kMostAcross;
   return aware ? PrecisionLattice{std::max(config.vehicle.finest_cell_m, least_m)} : PrecisionLattice{};
 }
 

@@ -55,14 +55,11 @@ Extent extent_of(const WayMemory::Config& config) noexcept {
   return e;
 }
 
-int width(const WayMemory::Config& config) noexcept {
-  return static_cast<int>(std::ceil(2.0 * config.radius_m / config.finest_m - 1e-6));
-}
-
 /// One cell less on either side than plans take, for that much surfaces are off, and no less than the vehicle.
 int narrow_width(const WayMemory::Config& config) noexcept {
   const int body = static_cast<int>(std::ceil(2.0 * config.body_m / config.finest_m - 1e-6));
-  return std::clamp(body, std::max(width(config) - 2, 1), width(config));
+  const int across = WayMemory::cells_across(config);
+  return std::clamp(body, std::max(across - 2, 1), across);
 }
 
 /// Of the square inside the vehicle's circle, seen from above, so many cells as surely fit into it: however a gap lies.
@@ -75,9 +72,13 @@ int core_width(const WayMemory::Config& config) noexcept {
 
 double WayMemory::positions(const Config& config) noexcept { return extent_of(config).blocks; }
 
+int WayMemory::cells_across(const Config& config) noexcept {
+  return static_cast<int>(std::ceil(2.0 * config.radius_m / config.finest_m - 1e-6));
+}
+
 bool WayMemory::fits(const Config& config) noexcept {
-  return positions(config) <= static_cast<double>(kMaxPositions) &&
-         config.radius_m <= (kWidest + 1e-7) * config.finest_m && config.body_m <= config.radius_m;
+  return positions(config) <= static_cast<double>(kMaxPositions) && cells_across(config) <= kMostAcross &&
+         config.body_m <= config.radius_m;
 }
 
 std::size_t WayMemory::arena_bytes(const Config& config) noexcept {
@@ -89,7 +90,7 @@ std::size_t WayMemory::arena_bytes(const Config& config) noexcept {
 
 WayMemory::WayMemory(const Config& config, core::Arena& arena) noexcept
     : config_((ROBORUN_ASSERT(fits(config)), config)),
-      width_(width(config)),
+      width_(cells_across(config)),
       narrow_width_(narrow_width(config)),
       core_width_(core_width(config)),
       position_(arena.take<Position>(static_cast<std::size_t>(extent_of(config).blocks), "way positions")),

@@ -37,9 +37,10 @@ class WayMemory final : public Ways {
   };
   /// Blocks of the world.
   [[nodiscard]] static double positions(const Config& config) noexcept;
-  /// Radius of the largest vehicle, in cells: 17 of them across, see find_places().
-  static constexpr double kWidest = 8.5;
-  /// False for worlds of more than 262,144 blocks, a radius of more than kWidest cells, or less than body_m.
+  /// Cells across the vehicle with its room; at most kMostAcross, see find_places().
+  [[nodiscard]] static int cells_across(const Config& config) noexcept;
+  static constexpr int kMostAcross = 17;
+  /// False for worlds of more than 262,144 blocks, more than kMostAcross cells across, or a radius that is less than body_m.
   [[nodiscard]] static bool fits(const Config& config) noexcept;
   [[nodiscard]] static std::size_t arena_bytes(const Config& config) noexcept;
   /// Preconditions, asserted: fits(config), and the arena has arena_bytes().
