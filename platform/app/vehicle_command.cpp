@@ -38,6 +38,7 @@ struct Consequences {
   EnergyPerMetre least, at_top;              ///< At cheapest_mps, and at limits.speed_mps.
   Vector3 assumed_half_m = Vector3::Zero();  ///< flight::assumed_free_half_m().
   double gap_m{};                            ///< The narrowest that plans go through.
+  double thin_m{};                           ///< As far away limits.thinnest_m is a pixel wide; 0: not known.
   std::size_t bytes{};                       ///< In a world of 100 x 100 x 10 m.
 };
 
@@ -67,6 +68,7 @@ Consequences consequences_of(const vehicle::Vehicle& vehicle) {
   c.least = energy_per_metre(v, c.cheapest_mps);
   c.at_top = energy_per_metre(v, v.speed_mps);
   c.gap_m = 2.0 * planned_radius_m(v);
+  c.thin_m = v.thinnest_m * config.flight.pixels_per_tan;
   c.bytes = flight::FlightSystem::arena_bytes(config.flight) +
             board::backend_bytes(map_bounds_W(config.flight), images) + sizeof(flight::FlightSystem);
   return c;
@@ -105,6 +107,11 @@ std::vector<std::string> shortcomings_of(const vehicle::Vehicle& vehicle, const 
         "free",
         c.assumed_half_m.x(), c.assumed_half_m.z()));
   lines.push_back(fmt::format("cannot pass gaps narrower than {:.2f} m", c.gap_m));
+  if (c.thin_m > 0.0 && c.thin_m < c.stop.back()[1])
+    lines.push_back(
+        fmt::format("may fly into the first pole or wire of {:.0f} mm that it meets: it surely sees it from "
+                    "{:.2f} m, and stops within {:.2f} m",
+                    1000.0 * v.thinnest_m, c.thin_m, c.stop.back()[1]));
   return lines;
 }
 

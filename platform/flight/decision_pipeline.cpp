@@ -17,6 +17,7 @@ constexpr double kTrajectoryStep_s = 0.5;  // of the points that order the space
 constexpr std::size_t kTrajectoryPoints = 32;
 constexpr double kCornerRoom_m = 0.25;
 constexpr double kAtRest_mps = 0.05;
+constexpr double kAtGoal_m = 0.3;
 constexpr double kLeaving_mps = 0.5;
 constexpr double kTooFast = 1.5;
 constexpr double kForgets = 0.9;      // what the planner took, from one decision to the next
@@ -346,6 +347,16 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   draft_.planner_work.level = out.decision.point.p1_level;
   draft_.planner_budget.emplace(budget_of(core::StageId::kPlanner, out));
   remember(in, out);
+  // What comes to rest at the goal cannot be improved, and from there no path leads to it.
+  const MonotonicTime brakes = in.committed->start_time + from_seconds(in.committed->brake_begin_s);
+  draft_.keeps = std::isinf(draft_.committed_until_s) && draft_.takes_over >= brakes &&
+                 (in.committed->end_W() - in.goal_W).norm() <= kAtGoal_m;
+  if (draft_.keeps) {
+    draft_.trajectory = *in.committed;
+    kept_W_.clear();
+    out.planner_status = out.smoother_status = Status::kOk;
+    return;
+  }
   // Searches that find nothing may take all the time that there is: every other one begins with the narrow room.
   draft_.is_narrow = failures_ % 2 == 1 && may_squeeze();
   search(in, draft_.is_narrow ? slow_radius_m(config_.vehicle) : radius_m() + kCornerRoom_m, out);
@@ -373,7 +384,7 @@ double DecisionPipeline::arrival_s(const Trajectory& trajectory, const DecisionI
 void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noexcept {
   if (draft_.begun) {
     core::MeteredBudget budget = table_budget_of(core::StageId::kSmoother);
-    find_trajectory(in, budget, out);
+    if (!draft_.keeps) find_trajectory(in, budget, out);
     if (config_.turns) look_on(in, budget, out);
     give_way(in, budget, out);
     charge(core::StageId::kPlanner, draft_.planner_work, out);

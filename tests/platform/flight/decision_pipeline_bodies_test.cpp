@@ -66,9 +66,11 @@ class KnownMap final : public stages::OccupancyMap {
 /// Straight to the goal.
 class Straight final : public stages::Planner {
  public:
+  int asked{0};
   [[nodiscard]] Status plan(const stages::PlanRequest& request, const stages::MapView& /*view*/,
                             core::StageBudget& /*budget*/, stages::PlanResult& result) noexcept override {
     result = {};
+    ++asked;
     const Vector3 way = request.goal_W - request.start_W;
     (void)result.path_W.push_back(request.start_W);
     (void)result.path_W.push_back(request.start_W + std::min(1.0, request.horizon_m / way.norm()) * way);
@@ -235,6 +237,31 @@ TEST_F(Bodies, ItGoesAsideToTheSideThatIsFree) {
   };
   EXPECT_LT(side_m(1.6), -1.0);
   EXPECT_GT(side_m(-1.6), 1.0);
+}
+
+TEST_F(Bodies, WhatComesToRestAtTheGoalIsNotPlannedAnew) {
+  goal_W_ = {0.2, 0, 3};
+  const DecisionOutput out = decide({}, kHovers);
+  EXPECT_EQ(planner_.asked, 0);
+  EXPECT_EQ(out.kind, DecisionKind::kKeep);
+  EXPECT_EQ(out.planner_status, Status::kOk) << "no failure";
+  EXPECT_EQ(out.smoother_status, Status::kOk);
+  goal_W_ = {0.4, 0, 3};
+  EXPECT_EQ(decide({}, kHovers).kind, DecisionKind::kNew);
+  EXPECT_GT(planner_.asked, 0) << "not near enough";
+  const Trajectory flown = along_x(4.0);
+  goal_W_ = flown.end_W();
+  planner_.asked = 0;
+  (void)decide({}, flown);
+  EXPECT_GT(planner_.asked, 0) << "before it brakes a faster one may be found";
+}
+
+TEST_F(Bodies, AtTheGoalItGoesAsideAllTheSame) {
+  const std::vector<Mover> comes{{{10, 0, 3}, {-2, 0, 0}}};
+  goal_W_ = {0, 0, 3};
+  const DecisionOutput out = decide(comes, kHovers, 2.0);
+  ASSERT_EQ(out.kind, DecisionKind::kNew);
+  EXPECT_GT(nearest_m(out.trajectory, comes), kTouches_m);
 }
 
 }  // namespace
