@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <vector>
 
 #include "firmware_if/assert.hpp"
@@ -15,9 +17,39 @@ namespace {
 // Of words of 32 bits, which are floats.
 constexpr std::uint64_t kNothing = 0x7F800000U;  // +infinity: what most of an image of the open air is
 constexpr std::uint64_t kInvalid = 0x7FC00000U;  // the usual NaN: a lost pixel
+/// Of a call with words of 32 bits, before its widths.
+constexpr char kBits = 0, kThousandths = 1;
 /// Widths 0 to 64 are of differences.
 constexpr std::uint8_t kWidthOfNothing = 65, kWidthOfInvalid = 66;
 constexpr unsigned kMostBitsAtOnce = 32;
+
+bool is_number(std::uint64_t word) { return word != kNothing && word != kInvalid; }
+
+/// As sensor ports read a depth in millimetres, to the bit.
+std::uint32_t word_of_thousandths(std::uint32_t count) {
+  return std::bit_cast<std::uint32_t>(static_cast<float>(count) * 0.001F);
+}
+std::optional<std::uint32_t> thousandths_of(std::uint32_t word) {
+  constexpr float kMost = 16'000.0F;  // above it not every thousandth is a float of its own
+  const auto value = std::bit_cast<float>(word);
+  if (!(value >= 0.0F && value < kMost)) return {};
+  const auto count = static_cast<std::uint32_t>(std::lround(1000.0 * static_cast<double>(value)));
+  return word_of_thousandths(count) == word ? std::optional(count) : std::nullopt;
+}
+
+std::uint64_t word_at(std::string_view words, std::size_t bytes, std::size_t i) {
+  std::uint64_t word = 0;
+  std::memcpy(&word, words.data() + bytes * i, bytes);
+  return word;
+}
+
+bool are_thousandths(std::string_view words) {
+  for (std::size_t i = 0; i < words.size() / 4; ++i) {
+    const std::uint64_t word = word_at(words, 4, i);
+    if (is_number(word) && !thousandths_of(static_cast<std::uint32_t>(word))) return false;
+  }
+  return true;
+}
 
 /// Arithmetic on words of 16, 32 or 64 bits.
 struct Folding {
@@ -91,16 +123,19 @@ class GetBits {
 
 void append_coded_words(CodedWords& to, std::string_view words, const WordLayout& layout) {
   ROBORUN_ASSERT(words.size() % layout.bytes == 0 && layout.stride > 0);
+  if (words.empty()) return;
   const Folding folding(layout.bytes);
   std::vector<std::uint64_t> before(layout.stride, 0);
   PutBits bits(to.bits);
+  const bool counts = layout.bytes == 4 && are_thousandths(words);
+  if (layout.bytes == 4) to.widths += counts ? kThousandths : kBits;
   for (std::size_t i = 0; i < words.size() / layout.bytes; ++i) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, words.data() + layout.bytes * i, layout.bytes);
-    if (layout.bytes == 4 && (word == kNothing || word == kInvalid)) {
+    std::uint64_t word = word_at(words, layout.bytes, i);
+    if (layout.bytes == 4 && !is_number(word)) {
       to.widths += static_cast<char>(word == kNothing ? kWidthOfNothing : kWidthOfInvalid);
       continue;
     }
+    if (counts) word = *thousandths_of(static_cast<std::uint32_t>(word));
     std::uint64_t& last = before[i % layout.stride];
     const std::uint64_t number = folding.fold(folding.cut(word - last));
     last = word;
@@ -114,7 +149,12 @@ void append_coded_words(CodedWords& to, std::string_view words, const WordLayout
 void append_decoded_words(std::string& to, std::size_t count, const WordLayout& layout,
                           std::string_view& widths, std::string_view& bits) {
   ROBORUN_ASSERT(layout.stride > 0);
-  if (widths.size() < count) throw InputError("fewer widths than words");
+  if (count == 0) return;
+  const std::size_t forms = layout.bytes == 4 ? 1 : 0;
+  if (widths.size() < forms + count) throw InputError("fewer widths than words");
+  const char form = forms > 0 ? widths.front() : kBits;
+  if (form != kBits && form != kThousandths) throw InputError("no form of words");
+  widths.remove_prefix(forms);
   const Folding folding(layout.bytes);
   const std::size_t begin = to.size();
   to.resize(begin + layout.bytes * count);
@@ -127,7 +167,7 @@ void append_decoded_words(std::string& to, std::size_t count, const WordLayout& 
       const std::uint64_t highest = width == 0 ? 0 : std::uint64_t{1} << bits_below(width);
       std::uint64_t& last = before[i % layout.stride];
       last = folding.cut(last + folding.unfold(highest | get.get(bits_below(width))));
-      word = last;
+      word = form == kThousandths ? word_of_thousandths(static_cast<std::uint32_t>(last)) : last;
     } else if (layout.bytes != 4 || width < kWidthOfNothing || width > kWidthOfInvalid) {
       throw InputError("no width of a word");
     }

@@ -1,5 +1,5 @@
 /// Words of an image, a cloud or a sample, coded without loss for any bits. Each is its difference from the word `stride` before
-/// it that was a number. Of a difference the number of its bits goes into one text (few values, which zstd codes well) and the
+/// it that was a number: of its bits, or where all words of a call are whole thousandths, as the depths of cameras are, of these. Of a difference the number of its bits goes into one text (few values, which zstd codes well) and the
 /// bits themselves, which are mostly noise, into another one.
 #pragma once
 
@@ -9,7 +9,7 @@
 namespace roborun::log {
 
 struct CodedWords {
-  std::string widths;  ///< One byte per word.
+  std::string widths;  ///< One byte per word; before those of 4 bytes one that says what was coded.
   std::string bits;    ///< Whole bytes per call.
 };
 

@@ -6,6 +6,14 @@
 #include "core/random/counter_rng.hpp"
 
 namespace roborun::sitl {
+namespace {
+
+/// Depth cameras deliver whole millimetres. NaN and infinity stay.
+float delivered_m(double depth_m) noexcept {
+  return static_cast<float>(std::round(1000.0 * depth_m)) * 0.001F;
+}
+
+}  // namespace
 
 CameraSpec DepthCameraConfig::spec() const noexcept {
   CameraSpec spec;
@@ -79,7 +87,7 @@ void SimulatedDepthCamera::render(const Exposure& e) noexcept {
           0.01, depth_m + bounded_normal(bits) * (noise_.noise_m + noise_.noise_per_m * depth_m * depth_m));
     }
     if (depth_m <= spec_.range_min_m) depth_m = std::numeric_limits<double>::quiet_NaN();
-    image_[i] = static_cast<float>(depth_m);
+    image_[i] = delivered_m(depth_m);
   }
 }
 
@@ -93,8 +101,8 @@ void SimulatedDepthCamera::render_product(const Exposure& e, DepthEffects& effec
   }
   effects.apply(e, X_WC, ray_C_, image_);
   for (float& depth_m : image_)
-    if (!(static_cast<double>(depth_m) > spec_.range_min_m))
-      depth_m = std::numeric_limits<float>::quiet_NaN();
+    depth_m = static_cast<double>(depth_m) > spec_.range_min_m ? delivered_m(depth_m)
+                                                               : std::numeric_limits<float>::quiet_NaN();
 }
 
 std::array<firmware_if::CameraMount, 6> six_camera_mounts() noexcept {

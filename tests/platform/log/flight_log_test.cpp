@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <limits>
 #include <map>
 #include <memory>
@@ -49,16 +50,45 @@ TEST(WordCoding, GivesBackAnyBits) {
   for (const WordLayout layout : {WordLayout{4, 1}, {4, 3}, {4, 6}, {8, 1}, {8, 5}, {2, 4}}) {
     CodedWords coded;
     append_coded_words(coded, words, layout);
+    append_coded_words(coded, "", {4, 1});
     append_coded_words(coded, words.substr(0, 12), {4, 1});
     std::string_view widths = coded.widths;
     std::string_view bits = coded.bits;
     std::string decoded;
     append_decoded_words(decoded, words.size() / layout.bytes, layout, widths, bits);
     EXPECT_EQ(decoded, words) << layout.bytes << ", " << layout.stride;
+    append_decoded_words(decoded, 0, {4, 1}, widths, bits);
     append_decoded_words(decoded, 3, {4, 1}, widths, bits);
     EXPECT_EQ(decoded, words + words.substr(0, 12));
     EXPECT_TRUE(widths.empty() && bits.empty());
   }
+}
+
+TEST(WordCoding, DepthsInMillimetresAreCountsAndComeBackAsTheyWere) {
+  std::string words, nearly;
+  const std::string noise = test::noise(5, 3000);
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    const auto count = static_cast<float>(4000 + static_cast<std::uint8_t>(noise[i]));
+    const float depth_m = i % 7 == 0 ? std::numeric_limits<float>::infinity() : count * 0.001F;
+    Put(words).number(std::bit_cast<std::uint32_t>(depth_m));
+    Put(nearly).number(std::bit_cast<std::uint32_t>(depth_m) + (i == 2999 ? 1U : 0U));
+  }
+  const auto coded_bytes = [](const std::string& text) {
+    CodedWords coded;
+    append_coded_words(coded, text, {4, 1});
+    std::string_view widths = coded.widths;
+    std::string_view bits = coded.bits;
+    std::string decoded;
+    append_decoded_words(decoded, text.size() / 4, {4, 1}, widths, bits);
+    EXPECT_EQ(decoded, text);
+    EXPECT_TRUE(widths.empty() && bits.empty());
+    return coded.bits.size();
+  };
+  EXPECT_LT(2 * coded_bytes(words), coded_bytes(nearly)) << "one of them is a bit off: all are coded as bits";
+  std::string all;  // each that there is, and the first that is none
+  for (std::uint32_t count = 0; count <= 70'000; ++count)
+    Put(all).number(std::bit_cast<std::uint32_t>(static_cast<float>(count) * 0.001F));
+  (void)coded_bytes(all);
 }
 
 TEST(WordCoding, RefusesTextsThatEndEarlyAndWidthsThatAreNone) {
@@ -72,7 +102,10 @@ TEST(WordCoding, RefusesTextsThatEndEarlyAndWidthsThatAreNone) {
   decode(coded.widths, coded.bits);
   EXPECT_THROW(decode(std::string_view(coded.widths).substr(1), coded.bits), InputError);
   EXPECT_THROW(decode(coded.widths, std::string_view(coded.bits).substr(1)), InputError);
-  coded.widths[7] = 67;
+  std::string other = coded.widths;
+  other[7] = 67;
+  EXPECT_THROW(decode(other, coded.bits), InputError);
+  coded.widths[0] = 2;
   EXPECT_THROW(decode(coded.widths, coded.bits), InputError);
 }
 

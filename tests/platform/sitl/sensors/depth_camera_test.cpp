@@ -47,7 +47,9 @@ TEST(DepthCamera, SeesAWallAtItsDepthAlongTheOpticalAxis) {
       // The wall, or the ground where the ray meets that first.
       const double down = (2.0 * (static_cast<double>(v) + 0.5) / 16.0) - 1.0;
       const double wanted = down > 0.5 ? 5.0 / down : 10.0;
-      ASSERT_NEAR(frame.depth_m[v * 16 + u], wanted, 1e-4) << u << " " << v;
+      const float depth_m = frame.depth_m[v * 16 + u];
+      ASSERT_NEAR(depth_m, wanted, 5.1e-4) << u << " " << v;
+      ASSERT_EQ(depth_m, std::round(1000.0F * depth_m) * 0.001F) << "whole millimetres";
     }
   }
 }
