@@ -17,6 +17,7 @@ constexpr double kStaticV2_m3 = 150e3;
 constexpr double kAwareV0_m3 = 60e3;
 constexpr double kAwareV1_m3 = 1e6;
 constexpr double kRemembered_m3 = 6e3;
+constexpr double kAll_m3 = std::numeric_limits<double>::infinity();
 constexpr double kStaticSpeed_mps = 0.5;
 constexpr double kTight =
     3.0;  // published cells: where the space asks for less than that, a narrow way is one
@@ -35,6 +36,8 @@ struct Governor::Task {
   const Situation& situation;
   double overhead_s;
   double see_m3;  ///< What the images of this decision see.
+  double
+      around_m3;  ///< What plans are checked in: that, or as much of what the map holds around the vehicle.
 };
 
 /// The levels of p0 that the solver may choose from, and what there is time for.
@@ -213,19 +216,19 @@ bool Governor::near_goal(const Situation& situation) const noexcept {
   return situation.distance_to_goal_m < config_.policy.near_goal_m;
 }
 
-/// Eq. 4 summed over the stages, with all volumes a share of what is in view (the planner explores only its
-/// own share of that), and the reserve on top.
-double Governor::needed_s(const Task& task, int level, double share) const noexcept {
-  return (task.overhead_s + predicted_s(Knob::kPerceive, level, share * task.see_m3) +
-          predicted_s(Knob::kExport, level, share * task.see_m3) +
-          predicted_s(Knob::kPlan, level, share * config_.policy.planner_share * task.see_m3)) *
+/// Eq. 4 summed over the stages, with no more of each volume than this (the planner explores only its own share), and the reserve
+/// on top. What is exported lies around the vehicle, on all sides: of one camera's view that alone would end halfway to what it sees.
+double Governor::needed_s(const Task& task, int level, double most_m3) const noexcept {
+  const double see_m3 = std::fmin(task.see_m3, most_m3);
+  return (task.overhead_s + predicted_s(Knob::kPerceive, level, see_m3) +
+          predicted_s(Knob::kExport, level, std::fmin(task.around_m3, most_m3)) +
+          predicted_s(Knob::kPlan, level, config_.policy.planner_share * see_m3)) *
          (1.0 + config_.policy.reserve_ratio);
 }
 
 /// All that is in view; of cells finer than the published ones, what is nearest.
 double Governor::least_s(const Task& task, int level) const noexcept {
-  const bool fine = level < published_level() && task.see_m3 > config_.policy.fine_volume_m3;
-  return needed_s(task, level, fine ? config_.policy.fine_volume_m3 / task.see_m3 : 1.0);
+  return needed_s(task, level, level < published_level() ? config_.policy.fine_volume_m3 : kAll_m3);
 }
 
 /// Step 1: how precisely must we look? An obstacle grows by up to a cell, and so does the vehicle's box, on
@@ -301,9 +304,10 @@ Governor::Precision Governor::in_time(const Task& task, int asked_level, double 
   while (result.coarsest < config_.coarsest_level && least_s(task, result.coarsest) > deadline_s)
     ++result.coarsest;
   result.finest = std::min(asked_level, published_level());
-  while (result.finest < result.coarsest && needed_s(task, result.finest, 1.0) > deadline_s) ++result.finest;
+  while (result.finest < result.coarsest && needed_s(task, result.finest, kAll_m3) > deadline_s)
+    ++result.finest;
   const double none_s = needed_s(task, result.coarsest, 0.0);
-  const double all_s = needed_s(task, result.coarsest, 1.0);
+  const double all_s = needed_s(task, result.coarsest, kAll_m3);
   if (all_s > deadline_s) result.share = std::max(deadline_s - none_s, 0.0) / (all_s - none_s);
   return result;
 }
@@ -350,7 +354,9 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   if (config_.design != Design::kAware) return decide_static(profile);
   const Policy& policy = config_.policy;
   const double see_m3 = profile.sensor_volume_m3 > 0.0 ? profile.sensor_volume_m3 : 0.0;  // NaN: nothing
-  const Task task{profile, situation, overhead_s(), see_m3};
+  const double map_m3 = profile.map_volume_m3 > 0.0 ? profile.map_volume_m3 : 0.0;
+  const double around_m3 = std::fmax(see_m3, std::fmin(kRemembered_m3, map_m3));
+  const Task task{profile, situation, overhead_s(), see_m3, around_m3};
   Decision d;
   const int asked = asked_level(task, d);                    // 1
   double time_s = deadline_s(task, asked, d);                // 2
@@ -365,7 +371,7 @@ Decision Governor::decide(const SpaceProfile& profile, const Situation& situatio
   // 5. Infeasible: the quickest decision there is; until it is there the vehicle lives on its braking tail.
   if (d.solution.status != Status::kOk) {
     d.solution.v0_m3 = see_m3;
-    d.solution.v1_m3 = d.solution.v0_m3;
+    d.solution.v1_m3 = around_m3;
     d.solution.v2_m3 = plan_m3;
     fill_prediction(d);
     time_s =

@@ -132,8 +132,8 @@ class Governor final : public DecisionPolicy {
   /// Levels finer than asked for after so many failed decisions.
   [[nodiscard]] int finer_levels(const Situation& situation) const noexcept;
   [[nodiscard]] bool near_goal(const Situation& situation) const noexcept;
-  /// Returns how long a decision takes that processes this share of all that is in view.
-  [[nodiscard]] double needed_s(const Task& task, int level, double share) const noexcept;
+  /// Returns how long a decision takes that processes all that is in view and around, but no more of it than this.
+  [[nodiscard]] double needed_s(const Task& task, int level, double most_m3) const noexcept;
   /// Returns the same of as much as it must process at this level.
   [[nodiscard]] double least_s(const Task& task, int level) const noexcept;
   [[nodiscard]] double predicted_s(Knob knob, int level, double volume_m3) const noexcept;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include "core/random/counter_rng.hpp"
@@ -205,6 +206,27 @@ TEST(Governor, FineCellsAreForWhatIsNearAndEndInTime) {
   const Decision all = Governor(config).decide(p, situation);
   EXPECT_EQ(all.point.p0_level, 0);
   EXPECT_GT(seconds(all.point.deadline), 5.0);
+}
+
+/// One camera that sees 10 m far sees 680 m3, which as a ball around the vehicle end after 5.5 m.
+TEST(Governor, PlansReachAsFarAsOneCameraSees) {
+  Governor sut(paper_config(Design::kAware));
+  SpaceProfile p = open_space(10.0, 1.0);
+  p.sensor_volume_m3 = 680.0;
+  for (int i = 0; i < kPrecisionLevels; ++i) (void)sut.decide(p, {0, 100.0});  // as coarse as it gets
+  const Decision d = sut.decide(p, {0, 100.0});
+  EXPECT_GT(d.point.v1_m3, 4.0 / 3.0 * std::numbers::pi * std::pow(7.5, 3));
+  SpaceProfile hurried = p;
+  hurried.closest_unknown_m = 5.0;
+  hurried.speed_mps = 4.0;
+  const Decision late = Governor(paper_config(Design::kAware)).decide(hurried, {0, 100.0});
+  EXPECT_EQ(late.solution.status, Status::kInfeasible)
+      << "there is not time for all stages, or something else is tested";
+  EXPECT_GT(late.point.v1_m3, 5000.0);
+  p.map_volume_m3 = p.sensor_volume_m3;  // nothing else is known
+  const Decision seen = sut.decide(p, {0, 100.0});
+  EXPECT_NEAR(seen.point.v1_m3, p.map_volume_m3, 1.0);
+  EXPECT_LT(seconds(d.point.deadline), 1.05 * seconds(seen.point.deadline)) << "it costs next to nothing";
 }
 
 /// Ways are narrow beside holes of a camera too: nothing stands near, and precise looks are not what lacks.
