@@ -35,9 +35,8 @@ struct Governor::Task {
   const SpaceProfile& profile;
   const Situation& situation;
   double overhead_s;
-  double see_m3;  ///< What the images of this decision see.
-  double
-      around_m3;  ///< What plans are checked in: that, or as much of what the map holds around the vehicle.
+  double see_m3;     ///< What the images of this decision see.
+  double around_m3;  ///< What plans are checked in: that, or as much of the map around the vehicle.
 };
 
 /// The levels of p0 that the solver may choose from, and what there is time for.

@@ -339,7 +339,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   draft_.start = in.committed->at(draft_.takes_over);
   draft_.planner_work = out.work[core::StageId::kPlanner];
   draft_.smoother_work = {};
-  draft_.leaves = draft_.is_narrow = draft_.replaces = draft_.dodges = draft_.keeps = false;
+  draft_.leaves = draft_.is_narrow = draft_.replaces = draft_.dodges = false;
   const Known known(*this, in);
   draft_.committed_until_s =
       free_until_s(known.view(), *in.committed, seconds(in.now - in.committed->start_time),

@@ -141,8 +141,8 @@ class DecisionPipeline {
     bool leaves{};     ///< The trajectory leaves a place without room.
     bool replaces{};   ///< What is flown meets a body, the trajectory later or not at all.
     bool dodges{};     ///< The trajectory goes aside, out of the way of a body.
-    bool
-        keeps{};  ///< Nothing is better than what is flown: it comes to rest at the goal, goes aside already, or meets a body latest.
+    /// Nothing is better than what is flown: it comes to rest at the goal, goes aside already, or meets a body latest.
+    bool keeps{};
   };
 
   void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;

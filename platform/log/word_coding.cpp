@@ -43,12 +43,17 @@ std::uint64_t word_at(std::string_view words, std::size_t bytes, std::size_t i) 
   return word;
 }
 
-bool are_thousandths(std::string_view words) {
+/// Words of 32 bits with a count in place of each number; none if one of them is not whole.
+std::optional<std::string> as_thousandths(std::string_view words) {
+  std::string counts(words);
   for (std::size_t i = 0; i < words.size() / 4; ++i) {
     const std::uint64_t word = word_at(words, 4, i);
-    if (is_number(word) && !thousandths_of(static_cast<std::uint32_t>(word))) return false;
+    if (!is_number(word)) continue;
+    const std::optional<std::uint32_t> count = thousandths_of(static_cast<std::uint32_t>(word));
+    if (!count) return {};
+    std::memcpy(counts.data() + 4 * i, &*count, 4);
   }
-  return true;
+  return counts;
 }
 
 /// Arithmetic on words of 16, 32 or 64 bits.
@@ -127,15 +132,15 @@ void append_coded_words(CodedWords& to, std::string_view words, const WordLayout
   const Folding folding(layout.bytes);
   std::vector<std::uint64_t> before(layout.stride, 0);
   PutBits bits(to.bits);
-  const bool counts = layout.bytes == 4 && are_thousandths(words);
+  const std::optional<std::string> counts = layout.bytes == 4 ? as_thousandths(words) : std::nullopt;
   if (layout.bytes == 4) to.widths += counts ? kThousandths : kBits;
+  if (counts) words = *counts;
   for (std::size_t i = 0; i < words.size() / layout.bytes; ++i) {
-    std::uint64_t word = word_at(words, layout.bytes, i);
+    const std::uint64_t word = word_at(words, layout.bytes, i);
     if (layout.bytes == 4 && !is_number(word)) {
       to.widths += static_cast<char>(word == kNothing ? kWidthOfNothing : kWidthOfInvalid);
       continue;
     }
-    if (counts) word = *thousandths_of(static_cast<std::uint32_t>(word));
     std::uint64_t& last = before[i % layout.stride];
     const std::uint64_t number = folding.fold(folding.cut(word - last));
     last = word;

@@ -1,6 +1,7 @@
 /// Words of an image, a cloud or a sample, coded without loss for any bits. Each is its difference from the word `stride` before
-/// it that was a number: of its bits, or where all words of a call are whole thousandths, as the depths of cameras are, of these. Of a difference the number of its bits goes into one text (few values, which zstd codes well) and the
-/// bits themselves, which are mostly noise, into another one.
+/// it that was a number: of its bits, or where all words of a call are whole thousandths, as the depths of cameras are, of
+/// these. Of a difference the number of its bits goes into one text (few values, which zstd codes well) and the bits
+/// themselves, which are mostly noise, into another one.
 #pragma once
 
 #include <string>
