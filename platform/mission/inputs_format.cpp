@@ -12,7 +12,7 @@ namespace roborun::mission {
 namespace {
 
 constexpr std::size_t kMostRecords = 1U << 20U;
-constexpr std::uint32_t kMostPart_bytes = 1U << 26U;
+constexpr std::uint32_t kMostRecords_bytes = 1U << 26U;
 
 constexpr const RecordSize& size_of(RecordKind kind) { return kRecordSizes[static_cast<std::size_t>(kind)]; }
 
@@ -27,17 +27,28 @@ void append_columns(std::string& to, std::string_view payloads, const RecordSize
   }
 }
 
-void append_words(log::CodedWords& to, std::string_view payloads, const RecordSize& size) {
+/// Kinds of one size have words of 8 or 2 bytes, all of which are numbers.
+void append_words(std::string& bits, std::string_view payloads, const RecordSize& size) {
   if (size.head == size.most) return;
-  std::string words;
+  std::string words, runs;
   for (std::size_t at = 0; at < payloads.size(); at += size.most)
     words.append(payloads.substr(at + size.head, size.most - size.head));
-  log::append_coded_words(to, words, size.words);
+  log::append_coded_words(runs, bits, words, size.words);
+}
+
+/// Of the words behind a head.
+log::WordLayout layout_of(RecordKind kind, std::string_view head) {
+  log::WordLayout layout = size_of(kind).words;
+  if (kind != RecordKind::kDepth) return layout;
+  std::uint16_t width = 0;
+  std::memcpy(&width, head.data() + kDepthWidthAt_bytes, sizeof width);
+  layout.row = width;
+  return layout;
 }
 
 /// The inverse of both.
 std::string rows_of(std::string_view columns, std::size_t count, const RecordSize& size,
-                    std::string_view& widths, std::string_view& bits) {
+                    std::string_view& bits) {
   std::string rows(count * size.most, '\0');
   for (std::size_t byte = 0; byte < size.head; ++byte) {
     char before = 0;
@@ -49,7 +60,8 @@ std::string rows_of(std::string_view columns, std::size_t count, const RecordSiz
   const std::size_t bytes = size.most - size.head;
   if (bytes == 0) return rows;
   std::string words;
-  log::append_decoded_words(words, count * bytes / size.words.bytes, size.words, widths, bits);
+  std::string_view no_runs;
+  log::append_decoded_words(words, count * bytes / size.words.bytes, size.words, no_runs, bits);
   for (std::size_t i = 0; i < count; ++i)
     rows.replace(i * size.most + size.head, bytes, words, i * bytes, bytes);
   return rows;
@@ -78,48 +90,40 @@ void InputBatch::add(RecordKind kind, std::string_view payload) {
   }
   const RecordSize& size = size_of(kind);
   log::Put(heads_).number(static_cast<std::uint32_t>(payload.size()));
-  heads_.append(payload.substr(0, size.head));
-  log::append_coded_words(words_, payload.substr(size.head), size.words);
+  const std::string_view head = payload.substr(0, size.head);
+  heads_ += head;
+  log::append_coded_words(heads_, bits_, payload.substr(size.head), layout_of(kind, head));
 }
 
 std::string InputBatch::take() {
-  std::string records;
-  log::CodedWords words;
+  std::string records, bits;
   log::Put(records).text(kinds_);
   for (std::size_t kind = 0; kind < kRecordKinds; ++kind) {
     append_columns(records, payloads_[kind], kRecordSizes[kind]);
-    append_words(words, payloads_[kind], kRecordSizes[kind]);
+    append_words(bits, payloads_[kind], kRecordSizes[kind]);
     payloads_[kind].clear();
   }
   records += heads_;
-  words.widths += words_.widths;
-  words.bits += words_.bits;
   std::string message;
-  const auto put = [&](const std::string& part, int level) {
-    log::Put(message).number(static_cast<std::uint32_t>(part.size())).text(compressor_.run(part, level));
-  };
-  put(records, log::kLevel);
-  put(words.widths, log::kLevelOfNoise);
-  message += words.bits;
+  log::Put(message).number(static_cast<std::uint32_t>(records.size()));
+  log::Put(message).text(compressor_.run(records, log::kLevel));
+  message += bits;
+  message += bits_;
   kinds_.clear();
   heads_.clear();
-  words_ = {};
+  bits_.clear();
   bytes_ = 0;
   return message;
 }
 
 InputRecords records_from(std::string_view message) {
   log::Get whole(message);
-  log::Decompressor decompressor;
-  std::array<std::string, 2> part;
-  for (std::string& to : part) {
-    const auto bytes = whole.number<std::uint32_t>();
-    if (bytes > kMostPart_bytes) throw InputError(fmt::format("inputs: a part of {} bytes", bytes));
-    decompressor.run(to, whole.text(), bytes);
-  }
-  std::string_view widths = part[1];
+  const auto bytes = whole.number<std::uint32_t>();
+  if (bytes > kMostRecords_bytes) throw InputError(fmt::format("inputs: records of {} bytes", bytes));
+  std::string text;
+  log::Decompressor().run(text, whole.text(), bytes);
   std::string_view bits = whole.rest();
-  log::Get get(part[0]);
+  log::Get get(text);
   const std::string_view kinds = get.text();
   if (kinds.size() > kMostRecords) throw InputError("inputs: too many records");
   std::array<std::size_t, kRecordKinds> count{};
@@ -131,8 +135,7 @@ InputRecords records_from(std::string_view message) {
   std::array<std::string, kRecordKinds> rows;
   for (std::size_t kind = 0; kind < kRecordKinds; ++kind) {
     const RecordSize& size = kRecordSizes[kind];
-    if (size.is_fixed())
-      rows[kind] = rows_of(get.bytes(count[kind] * size.head), count[kind], size, widths, bits);
+    if (size.is_fixed()) rows[kind] = rows_of(get.bytes(count[kind] * size.head), count[kind], size, bits);
   }
   InputRecords inputs;
   inputs.payloads.reserve(message.size());
@@ -146,18 +149,20 @@ InputRecords records_from(std::string_view message) {
       inputs.payloads.append(rows[static_cast<std::size_t>(kind)], from, size.most);
       from += size.most;
     } else {
-      const auto bytes = get.number<std::uint32_t>();
-      if (bytes < size.least || bytes > size.most ||
-          (bytes - size.head) % (size.words.bytes * size.words.stride) > 0)
+      const auto length = get.number<std::uint32_t>();
+      if (length < size.least || length > size.most ||
+          (length - size.head) % (size.words.bytes * size.words.stride) > 0)
         throw InputError("inputs: a record of another size");
-      inputs.payloads.append(get.bytes(size.head));
-      log::append_decoded_words(inputs.payloads, (bytes - size.head) / size.words.bytes, size.words, widths,
-                                bits);
+      const std::string_view head = get.bytes(size.head);
+      inputs.payloads.append(head);
+      std::string_view runs = get.rest();
+      log::append_decoded_words(inputs.payloads, (length - size.head) / size.words.bytes,
+                                layout_of(kind, head), runs, bits);
+      get = log::Get(runs);
     }
     inputs.records.push_back({kind, at, inputs.payloads.size() - at});
   }
-  if (!get.rest().empty() || !widths.empty() || !bits.empty())
-    throw InputError("inputs: more bytes than records");
+  if (!get.rest().empty() || !bits.empty()) throw InputError("inputs: more bytes than records");
   return inputs;
 }
 

@@ -1,11 +1,10 @@
 /// How the inputs of a flight, and what it did with them, stand in the messages of `/inputs`.
 ///
-/// A message holds the records of a tenth of a second, in the order in which the lanes read them, in three parts that have nothing
-/// in common; the first two as u32 bytes, u32 coded bytes, a frame of zstd:
+/// A message holds the records of a tenth of a second, in the order in which the lanes read them, in two parts; the first as u32
+/// bytes, u32 coded bytes, a frame of zstd:
 ///  - u32 count, one byte of kind each; for each kind of one size the heads of its records as columns (byte 0 of all, byte 1 of all,
-///    ..., each byte as its difference from the one before); of the others one by one u32 bytes and head;
-///  - the widths of the words behind the heads (word_coding.hpp): kinds of one size first, one by one, then the others in order;
-///  - the bits of these words.
+///    ..., each byte as its difference from the one before); of the others one by one u32 bytes, head and runs (word_coding.hpp);
+///  - the bits of the words behind the heads (word_coding.hpp): kinds of one size first, one by one, then the others in order.
 /// All in the byte order of x86-64 and AArch64.
 #pragma once
 
@@ -53,7 +52,8 @@ struct RecordSize {
   log::WordLayout words{1, 1};
   [[nodiscard]] constexpr bool is_fixed() const noexcept { return least == most; }
 };
-inline constexpr std::uint32_t kDepthHead_bytes = 4 + 8 + 4 + 2 + 2 + 4 * 4;
+inline constexpr std::uint32_t kDepthWidthAt_bytes = 4 + 8 + 4;  ///< A u16.
+inline constexpr std::uint32_t kDepthHead_bytes = kDepthWidthAt_bytes + 2 + 2 + 4 * 4;
 inline constexpr std::uint32_t kLidarHead_bytes = 4 + 8 + 4 + 2 * 4;
 inline constexpr std::uint32_t kSampleHead_bytes = 8 + 4;  ///< Stamp, sequence.
 inline constexpr std::uint32_t kGoal_bytes = 24;
@@ -216,8 +216,7 @@ class InputBatch {
  private:
   std::string kinds_;
   std::array<std::string, kRecordKinds> payloads_;  ///< Of kinds of one size: one after the other.
-  std::string heads_;
-  log::CodedWords words_;
+  std::string heads_, bits_;                        ///< Of the others.
   log::Compressor compressor_;
   std::size_t bytes_{0};
 };

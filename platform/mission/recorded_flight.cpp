@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::uint32_t kVersion = 7;
+constexpr std::uint32_t kVersion = 8;
 constexpr double kFarthest_m = 20e3;  // as in world files
 
 Json vector_json(const Vector3& v) { return {v.x(), v.y(), v.z()}; }

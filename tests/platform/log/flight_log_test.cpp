@@ -37,6 +37,10 @@ Topics topics_of(const std::string& path) {
   return topics;
 }
 
+struct Coded {
+  std::string runs, bits;
+};
+
 TEST(WordCoding, GivesBackAnyBits) {
   std::string words;
   const auto add = [&words](std::uint32_t word) { Put(words).number(word); };
@@ -47,20 +51,21 @@ TEST(WordCoding, GivesBackAnyBits) {
     add(word);
   words += test::noise(3, 4 * 2000);
   for (std::uint32_t i = 0; i < 2000; ++i) add(i % 3 == 0 ? nothing : 0x41200000U + i);
-  for (const WordLayout layout : {WordLayout{4, 1}, {4, 3}, {4, 6}, {8, 1}, {8, 5}, {2, 4}}) {
-    CodedWords coded;
-    append_coded_words(coded, words, layout);
-    append_coded_words(coded, "", {4, 1});
-    append_coded_words(coded, words.substr(0, 12), {4, 1});
-    std::string_view widths = coded.widths;
+  for (const WordLayout layout :
+       {WordLayout{4, 1}, {4, 3}, {4, 6}, {8, 1}, {8, 5}, {2, 4}, {4, 1, 64}, {4, 1, 1}, {4, 1, 9999}}) {
+    Coded coded;
+    append_coded_words(coded.runs, coded.bits, words, layout);
+    append_coded_words(coded.runs, coded.bits, "", {4, 1});
+    append_coded_words(coded.runs, coded.bits, words.substr(0, 12), {4, 1});
+    std::string_view runs = coded.runs;
     std::string_view bits = coded.bits;
     std::string decoded;
-    append_decoded_words(decoded, words.size() / layout.bytes, layout, widths, bits);
-    EXPECT_EQ(decoded, words) << layout.bytes << ", " << layout.stride;
-    append_decoded_words(decoded, 0, {4, 1}, widths, bits);
-    append_decoded_words(decoded, 3, {4, 1}, widths, bits);
+    append_decoded_words(decoded, words.size() / layout.bytes, layout, runs, bits);
+    EXPECT_EQ(decoded, words) << layout.bytes << ", " << layout.stride << ", " << layout.row;
+    append_decoded_words(decoded, 0, {4, 1}, runs, bits);
+    append_decoded_words(decoded, 3, {4, 1}, runs, bits);
     EXPECT_EQ(decoded, words + words.substr(0, 12));
-    EXPECT_TRUE(widths.empty() && bits.empty());
+    EXPECT_TRUE(runs.empty() && bits.empty());
   }
 }
 
@@ -74,14 +79,14 @@ TEST(WordCoding, DepthsInMillimetresAreCountsAndComeBackAsTheyWere) {
     Put(nearly).number(std::bit_cast<std::uint32_t>(depth_m) + (i == 2999 ? 1U : 0U));
   }
   const auto coded_bytes = [](const std::string& text) {
-    CodedWords coded;
-    append_coded_words(coded, text, {4, 1});
-    std::string_view widths = coded.widths;
+    Coded coded;
+    append_coded_words(coded.runs, coded.bits, text, {4, 1});
+    std::string_view runs = coded.runs;
     std::string_view bits = coded.bits;
     std::string decoded;
-    append_decoded_words(decoded, text.size() / 4, {4, 1}, widths, bits);
+    append_decoded_words(decoded, text.size() / 4, {4, 1}, runs, bits);
     EXPECT_EQ(decoded, text);
-    EXPECT_TRUE(widths.empty() && bits.empty());
+    EXPECT_TRUE(runs.empty() && bits.empty());
     return coded.bits.size();
   };
   EXPECT_LT(2 * coded_bytes(words), coded_bytes(nearly)) << "one of them is a bit off: all are coded as bits";
@@ -91,22 +96,37 @@ TEST(WordCoding, DepthsInMillimetresAreCountsAndComeBackAsTheyWere) {
   (void)coded_bytes(all);
 }
 
-TEST(WordCoding, RefusesTextsThatEndEarlyAndWidthsThatAreNone) {
+TEST(WordCoding, AnImageTakesFewerBitsThanItsPixelsInARow) {
+  constexpr std::size_t kWidth = 64, kHeight = 48;
+  std::string words;
+  const std::string noise = test::noise(5, kWidth * kHeight);
+  for (std::size_t i = 0; i < kWidth * kHeight; ++i) {
+    const auto count =
+        static_cast<float>(4000 + 100 * (i % kWidth) + static_cast<std::uint8_t>(noise[i]) / 8);
+    Put(words).number(std::bit_cast<std::uint32_t>(count * 0.001F));
+  }
+  Coded image, row;
+  append_coded_words(image.runs, image.bits, words, {4, 1, kWidth});
+  append_coded_words(row.runs, row.bits, words, {4, 1});
+  EXPECT_LT(image.bits.size(), row.bits.size());
+}
+
+TEST(WordCoding, RefusesTextsThatEndEarlyAndRunsThatAreNone) {
   const std::string words = test::noise(3, 4 * 20);
-  CodedWords coded;
-  append_coded_words(coded, words, {4, 1});
-  const auto decode = [](std::string_view widths, std::string_view bits) {
+  Coded coded;
+  append_coded_words(coded.runs, coded.bits, words, {4, 1});
+  const auto decode = [](std::string_view runs, std::string_view bits) {
     std::string to;
-    append_decoded_words(to, 20, {4, 1}, widths, bits);
+    append_decoded_words(to, 20, {4, 1}, runs, bits);
   };
-  decode(coded.widths, coded.bits);
-  EXPECT_THROW(decode(std::string_view(coded.widths).substr(1), coded.bits), InputError);
-  EXPECT_THROW(decode(coded.widths, std::string_view(coded.bits).substr(1)), InputError);
-  std::string other = coded.widths;
-  other[7] = 67;
-  EXPECT_THROW(decode(other, coded.bits), InputError);
-  coded.widths[0] = 2;
-  EXPECT_THROW(decode(coded.widths, coded.bits), InputError);
+  decode(coded.runs, coded.bits);
+  EXPECT_EQ(coded.runs, std::string({0, 0, 20})) << "a form, then what the run is of and its length";
+  EXPECT_THROW(decode(coded.runs, std::string_view(coded.bits).substr(0, coded.bits.size() - 1)), InputError);
+  for (const std::string& runs :
+       {std::string(), std::string({0}), std::string({0, 0}), std::string({2, 0, 20}),
+        std::string({0, 3, 20}), std::string({0, 0, 21}), std::string({0, 0, 19}), std::string({0, 0, 0}),
+        std::string({0, 0, -1}), std::string({0, 0, -1, -1, -1, -1, -1, 1})})
+    EXPECT_THROW(decode(runs, coded.bits), InputError);
 }
 
 TEST(FlightLog, HoldsTheTopicsOfItsReadme) {
