@@ -20,7 +20,8 @@ namespace {
 constexpr const char* kStyle =
     "body{font-family:Helvetica,Arial,sans-serif;color:#1f2933;margin:2em auto;max-width:1420px;padding:0 "
     "1em}"
-    "pre{background:#f7f9fb;padding:1em;overflow-x:auto}svg{max-width:100%;height:auto}";
+    "pre{background:#f7f9fb;padding:1em;overflow-x:auto}svg{max-width:100%;height:auto}"
+    "@media(prefers-color-scheme:dark){body{background:#14181d;color:#e4e7eb}pre{background:#1f2933}}";
 
 /// The flights of the representative environment.
 std::vector<report::MissionReport> kept_flights(const SweepStore& store) {

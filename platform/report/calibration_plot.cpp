@@ -9,7 +9,8 @@
 namespace roborun::report {
 namespace {
 
-constexpr double kPanelWidth = 440.0;
+constexpr std::size_t kColumns = 2;
+constexpr double kPanelWidth = kPictureWidth / kColumns;
 constexpr double kPanelHeight = 360.0;
 constexpr double kMargin = 62.0;
 
@@ -46,13 +47,13 @@ void draw_panel(Svg& svg, const CalibrationPanel& panel, double left, double top
   const auto y = [&](double t) { return top + kPanelHeight - 44.0 - time.ratio(t) * (kPanelHeight - 84.0); };
   svg.text(left + kMargin, top + 24.0, panel.title, "start", 15, kInk, "bold");
   for (double v = volume.low; v <= volume.high * 1.01; v *= 10.0) {
-    svg.add(R"(<line x1="{0:.1f}" y1="{1:.1f}" x2="{0:.1f}" y2="{2:.1f}" stroke="#e4e7eb"/>)", x(v),
-            y(time.low), y(time.high));
+    svg.add(R"(<line x1="{0:.1f}" y1="{1:.1f}" x2="{0:.1f}" y2="{2:.1f}" stroke="{3}"/>)", x(v), y(time.low),
+            y(time.high), kGrid);
     svg.text(x(v), y(time.low) + 18.0, fmt::format("{:g}", v), "middle", 12, kSoft);
   }
   for (double t = time.low; t <= time.high * 1.01; t *= 10.0) {
-    svg.add(R"(<line x1="{1:.1f}" y1="{0:.1f}" x2="{2:.1f}" y2="{0:.1f}" stroke="#e4e7eb"/>)", y(t),
-            x(volume.low), x(volume.high));
+    svg.add(R"(<line x1="{1:.1f}" y1="{0:.1f}" x2="{2:.1f}" y2="{0:.1f}" stroke="{3}"/>)", y(t),
+            x(volume.low), x(volume.high), kGrid);
     svg.text(x(volume.low) - 6.0, y(t) + 4.0, fmt::format("{:g}", 1e3 * t), "end", 12, kSoft);
   }
   svg.text(x(volume.low), y(time.low) + 36.0, "volume, m3; time, ms", "start", 12, kSoft);
@@ -70,7 +71,7 @@ void draw_panel(Svg& svg, const CalibrationPanel& panel, double left, double top
     for (const CalibrationPoint& p : curve.points) {
       if (!(p.volume_m3 > 0.0)) continue;
       svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="3" fill="{}" stroke="{}"/>)", x(p.volume_m3),
-              y(p.measured_s), p.hold_out ? "#ffffff" : colour, colour);
+              y(p.measured_s), p.hold_out ? kPaper : colour, colour);
     }
     svg.text(left + kPanelWidth - 8.0, top + 60.0 + 17.0 * static_cast<double>(c),
              fmt::format("{} m", curve.cell_m), "end", 12, colour.c_str(), "bold");
@@ -83,12 +84,13 @@ std::string calibration_svg(const std::string& title, const std::vector<Calibrat
   Svg svg;
   svg.text(20.0, 28.0, title, "start", 17, kInk, "bold");
   for (std::size_t i = 0; i < panels.size(); ++i)
-    draw_panel(svg, panels[i], kPanelWidth * static_cast<double>(i), 36.0);
-  svg.text(20.0, kPanelHeight + 60.0,
-           "lines: the model; filled points: fitted; open points: held out; colours: precision", "start", 12,
-           kSoft);
-  return svg.finish(kPanelWidth * static_cast<double>(std::max<std::size_t>(panels.size(), 1)),
-                    kPanelHeight + 76.0);
+    draw_panel(svg, panels[i], kPanelWidth * static_cast<double>(i % kColumns),
+               36.0 + kPanelHeight * static_cast<double>(i / kColumns));
+  const double bottom = 60.0 + kPanelHeight * static_cast<double>((panels.size() + kColumns - 1) / kColumns);
+  const std::string key =
+      "lines: the model; filled points: fitted; open points: held out; colours: precision";
+  svg.text(20.0, bottom, key, "start", 12, kSoft);
+  return svg.finish(bottom + 16.0, title, "Time of a stage over the volume that it worked on. " + key + ".");
 }
 
 }  // namespace roborun::report

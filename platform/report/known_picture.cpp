@@ -11,7 +11,6 @@
 namespace roborun::report {
 namespace {
 
-constexpr double kPictureWidth = 830.0;
 constexpr double kPictureLeft = 50.0;
 constexpr double kPictureRight = 20.0;
 constexpr double kPictureMaxPanel = 700.0;
@@ -82,22 +81,23 @@ std::string known_svg(const Scene& scene, std::span<const MissionReport> mission
   const double scale =
       std::min((kPictureWidth - kPictureLeft - kPictureRight) / size.x(), kPictureMaxPanel / size.y());
   const double panel = size.y() * scale;
-  svg.text(kPictureLeft, 26, scene.title, "start", 15, kInk, "bold");
+  const std::string finding = finding_of(missions);
+  draw_titles(svg, finding, scene, kPictureLeft);
   const Quantity coloured = quantity(PathColour::kSpeed, missions);
-  draw_legend(svg, coloured, kPictureWidth - kPictureRight, 40);
+  draw_legend(svg, coloured, kPictureWidth - kPictureRight, 54);
   constexpr std::array<Key, 4> kKeys{{{kFree, "known to be free", 140},
                                       {kSeen, "known to be occupied", 170},
                                       {kUnseen, "not known", 95},
                                       {"#3e4c59", "obstacle (the truth)", 0}}};
   double x = kPictureLeft;
   for (const Key& key : kKeys) {
-    svg.add(R"(<rect x="{:.1f}" y="80" width="13" height="13" fill="{}" stroke="{}" stroke-width="0.5"/>)", x,
+    svg.add(R"(<rect x="{:.1f}" y="94" width="13" height="13" fill="{}" stroke="{}" stroke-width="0.5"/>)", x,
             key.fill, kSoft);
-    svg.text(x + 19, 91, key.text, "start", 13);
+    svg.text(x + 19, 105, key.text, "start", 13);
     x += key.width + 19;
   }
   svg.add("<style>@media (prefers-reduced-motion) {{ .vehicle {{ display: none }} }}</style>");
-  double y = 120;
+  double y = 134;
   for (const MissionReport& mission : missions) {
     const MissionResult& r = mission.result;
     svg.text(kPictureLeft, y,
@@ -113,10 +113,11 @@ std::string known_svg(const Scene& scene, std::span<const MissionReport> mission
     y += panel + 56;
   }
   return svg.finish(
-      kPictureWidth, y - 20, scene.title,
+      y - 20, finding,
       "Worlds from above: the way flown, coloured by speed, over what the vehicle's map knew to be "
       "free, knew to be occupied, and did not know when the flight ended. A red dot flies the way at "
-      "ten times its speed.");
+      "ten times its speed. " +
+          scene.title);
 }
 
 }  // namespace roborun::report

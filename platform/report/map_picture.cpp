@@ -10,12 +10,11 @@
 namespace roborun::report {
 namespace {
 
-constexpr double kWidth_px = 900.0;
 constexpr double kMargin_px = 50.0;
 constexpr double kTallest_px = 700.0;
 
 double scale_px(const MapPanel& panel) {
-  return std::min((kWidth_px - 2.0 * kMargin_px) / panel.columns, kTallest_px / panel.rows);
+  return std::min((kPictureWidth - 2.0 * kMargin_px) / panel.columns, kTallest_px / panel.rows);
 }
 
 /// Runs of equal cells in a row are one rectangle.
@@ -56,7 +55,9 @@ std::string map_svg(const std::string& title, std::span<const MapPanel> panels) 
   }
   return fmt::format(
              "<svg xmlns='http://www.w3.org/2000/svg' width='{0}' height='{1:.0f}' viewBox='0 0 {0} {1:.0f}' "
-             "font-family='sans-serif' font-size='13' shape-rendering='crispEdges'>\n"
+             "font-family='sans-serif' font-size='13' "
+             "shape-rendering='crispEdges'>\n<title>{3}</title>\n<desc>Cuts through the map: "
+             "occupied, free and unknown cells.</desc>\n"
              "<style>.f{{fill:#cfe8ff}}.o{{fill:#222}}</style>\n<rect width='100%' height='100%' "
              "fill='white'/>\n"
              "<text x='{2}' y='26' font-size='16'>{3}</text>\n"
@@ -64,7 +65,7 @@ std::string map_svg(const std::string& title, std::span<const MapPanel> panels) 
              "<rect x='150' y='40' width='12' height='12' class='f'/><text x='168' y='51'>free</text>\n"
              "<rect x='220' y='40' width='12' height='12' fill='#d9d9d9'/><text x='238' "
              "y='51'>unknown</text>\n",
-             kWidth_px, top_px, kMargin_px, xml_escape(title)) +
+             kPictureWidth, top_px, kMargin_px, xml_escape(title)) +
          body + "</svg>\n";
 }
 

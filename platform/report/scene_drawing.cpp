@@ -32,6 +32,20 @@ int colour_step(const MissionReport& mission, const PathPoint& point, const Quan
 
 }  // namespace
 
+std::string finding_of(std::span<const MissionReport> missions) {
+  std::string finding;
+  for (const MissionReport& m : missions) {
+    finding += fmt::format("{}{} {} in {:.0f} s", finding.empty() ? "" : ", ", m.result.design,
+                           outcome(m.result), m.result.mission_time_s);
+  }
+  return finding;
+}
+
+void draw_titles(Svg& svg, const std::string& finding, const Scene& scene, double left) {
+  svg.text(left, 26, finding, "start", finding.size() < 90 ? 15 : 12, kInk, "bold");
+  svg.text(left, 44, scene.title, "start", 12, kSoft);
+}
+
 void draw_world(Svg& svg, const Scene& scene, const Frame& f, double height,
                 const std::function<void()>& below) {
   const Vector3 size = scene.bounds_W.size();

@@ -37,6 +37,10 @@ struct Quantity {
 
 [[nodiscard]] Quantity quantity(PathColour colour, std::span<const MissionReport> missions);
 
+/// What a picture of missions shows first: who arrived, and when.
+[[nodiscard]] std::string finding_of(std::span<const MissionReport> missions);
+/// The finding, and below it what world and settings these were.
+void draw_titles(Svg& svg, const std::string& finding, const Scene& scene, double left);
 /// Bounds, congestion, obstacles, zones and axes, `height` points high. `below` (may be empty) draws what lies below the
 /// obstacles.
 void draw_world(Svg& svg, const Scene& scene, const Frame& f, double height,

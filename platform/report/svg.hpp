@@ -11,7 +11,11 @@
 namespace roborun::report {
 
 inline constexpr const char* kInk = "#1f2933";
-inline constexpr const char* kSoft = "#7b8794";
+inline constexpr const char* kSoft = "#7b8794";  ///< Readable on light and dark.
+inline constexpr const char* kGrid = "#e4e7eb";
+inline constexpr const char* kPaper = "#ffffff";
+/// Of every picture: a page of GitHub is about so wide, and texts are read at their size there.
+inline constexpr double kPictureWidth = 830.0;
 
 /// A dark-to-bright ramp that stays readable without colour vision: violet, teal, yellow-green. ratio 0 .. 1,
 /// as #rrggbb.
@@ -63,18 +67,19 @@ class Svg {
     add(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="{}" font-size="{}" fill="{}" font-weight="{}">{}</text>)",
         x, y, anchor, size, fill, weight, xml_escape(what));
   }
-  /// The whole file; `title` and `description` (may be empty) are for those who cannot see it.
-  [[nodiscard]] std::string finish(double width, double height, const std::string& title = {},
-                                   const std::string& description = {}) const {
-    std::string head;
-    if (!title.empty())
-      head = fmt::format("<title>{}</title>\n<desc>{}</desc>\n", xml_escape(title), xml_escape(description));
+  /// The whole file, `kPictureWidth` wide; `title` and `description` are for those who cannot see it. Where the reader's
+  /// screen is dark, paper and ink are exchanged; worlds from above stay as they are.
+  [[nodiscard]] std::string finish(double height, const std::string& title,
+                                   const std::string& description) const {
     return fmt::format(
         R"(<svg xmlns="http://www.w3.org/2000/svg" width="{0:.0f}" height="{1:.0f}" viewBox="0 0 {0:.0f} {1:.0f}" font-family="Helvetica, Arial, sans-serif">
-{3}<rect width="100%" height="100%" fill="#ffffff"/>
+<title>{3}</title>
+<desc>{4}</desc>
+<style>@media (prefers-color-scheme: dark) {{ [fill="{5}"] {{ fill: #14181d }} [fill="{6}"] {{ fill: #e4e7eb }} [stroke="{6}"] {{ stroke: #e4e7eb }} [stroke="{7}"] {{ stroke: #323f4b }} }}</style>
+<rect width="100%" height="100%" fill="{5}"/>
 {2}</svg>
 )",
-        width, height, body_, head);
+        kPictureWidth, height, body_, xml_escape(title), xml_escape(description), kPaper, kInk, kGrid);
   }
 
  private:

@@ -4,18 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "platform/report/scene_drawing.hpp"
 
 namespace roborun::report {
 namespace {
 
-constexpr double kWidth = 1400.0;
-constexpr double kLeastWidth = 860.0;  // for the texts above the panels
-constexpr double kLeft = 70.0;
-constexpr double kRight = 40.0;
+constexpr double kLeft = 60.0;
+constexpr double kRight = 20.0;
 constexpr double kChartHeight = 90.0;
 constexpr double kMaxPanel = 330.0;
+constexpr double kZoomHeight = 240.0;
 constexpr std::array<const char*, 4> kDesignColour{"#0072b2", "#d55e00", "#009e73",
                                                    "#cc79a7"};  // Okabe and Ito
 
@@ -29,8 +29,8 @@ struct Series {
 void draw_chart(Svg& svg, std::span<const MissionReport> missions, const Series& series, const Frame& f,
                 double right, double top) {
   const double left = f.left;
-  svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="#ffffff" stroke="#cbd2d9"/>)",
-          left, top, right - left, kChartHeight);
+  svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="{}" stroke="#cbd2d9"/>)", left,
+          top, right - left, kChartHeight, kPaper);
   svg.text(left, top - 6, series.label, "start", 12, kInk, "bold");
   constexpr double kLow = 0.1;
   const auto y_of = [&](double value) {
@@ -41,14 +41,14 @@ void draw_chart(Svg& svg, std::span<const MissionReport> missions, const Series&
   };
   if (series.logarithmic) {
     for (double tick = kLow; tick <= series.top * 1.001; tick *= 10.0) {
-      svg.add(R"(<line x1="{0:.1f}" x2="{1:.1f}" y1="{2:.1f}" y2="{2:.1f}" stroke="#e4e7eb"/>)", left, right,
-              y_of(tick));
+      svg.add(R"(<line x1="{0:.1f}" x2="{1:.1f}" y1="{2:.1f}" y2="{2:.1f}" stroke="{3}"/>)", left, right,
+              y_of(tick), kGrid);
       svg.text(left - 6, y_of(tick) + 4, fmt::format("{:g}", tick), "end", 11, kSoft);
     }
   } else {
     for (const double tick : {0.0, 0.5 * series.top, series.top}) {
-      svg.add(R"(<line x1="{0:.1f}" x2="{1:.1f}" y1="{2:.1f}" y2="{2:.1f}" stroke="#e4e7eb"/>)", left, right,
-              y_of(tick));
+      svg.add(R"(<line x1="{0:.1f}" x2="{1:.1f}" y1="{2:.1f}" y2="{2:.1f}" stroke="{3}"/>)", left, right,
+              y_of(tick), kGrid);
       svg.text(left - 6, y_of(tick) + 4, fmt::format("{:g}", tick), "end", 11, kSoft);
     }
   }
@@ -63,29 +63,81 @@ void draw_chart(Svg& svg, std::span<const MissionReport> missions, const Series&
   }
 }
 
+/// What lies between two x of the world, and of a flight's path through it.
+Scene part_of(const Scene& scene, double low_m, double high_m) {
+  Scene part = scene;
+  std::erase_if(part.circles, [&](const Scene::Circle& c) {
+    return c.x_m + c.radius_m < low_m || c.x_m - c.radius_m > high_m;
+  });
+  std::erase_if(part.rects,
+                [&](const Scene::Rect& r) { return r.x_m + r.width_m < low_m || r.x_m > high_m; });
+  part.zone_borders_m.clear();
+  part.heat_rows = 0;
+  return part;
+}
+
+/// The congested ends, larger, with the path of one flight, from `top` on. Returns how much height that takes.
+double draw_zooms(Svg& svg, const Scene& scene, const MissionReport& mission, const Quantity& coloured,
+                  double top) {
+  if (scene.zone_borders_m.size() != 2) return 0.0;
+  const double half = 0.5 * (kPictureWidth - kLeft - kRight - 20.0);
+  double left = kLeft;
+  double tallest = 0.0;
+  for (const auto& [name, low_m, high_m] :
+       {std::tuple{"A", scene.bounds_W.min_W.x(), scene.zone_borders_m.front()},
+        std::tuple{"C", scene.zone_borders_m.back(), scene.bounds_W.max_W.x()}}) {
+    MissionReport inside = mission;
+    std::erase_if(inside.path, [&](const PathPoint& p) { return p.p_WB.x() < low_m || p.p_WB.x() > high_m; });
+    double low_y_m = scene.start_W.y();
+    double high_y_m = scene.start_W.y();
+    for (const PathPoint& p : inside.path) {
+      low_y_m = std::min(low_y_m, p.p_WB.y());
+      high_y_m = std::max(high_y_m, p.p_WB.y());
+    }
+    constexpr double kBeside_m = 25.0;
+    low_y_m = std::max(low_y_m - kBeside_m, scene.bounds_W.min_W.y());
+    high_y_m = std::min(high_y_m + kBeside_m, scene.bounds_W.max_W.y());
+    const double scale = std::min(half / (high_m - low_m), kZoomHeight / (high_y_m - low_y_m));
+    const double width = (high_m - low_m) * scale;
+    const double height = (high_y_m - low_y_m) * scale;
+    svg.text(left, top,
+             fmt::format("zone {} with {}: {:.0f} m x {:.0f} m", name, mission.result.design, high_m - low_m,
+                         high_y_m - low_y_m));
+    svg.add(R"(<svg x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}">)", left, top + 8.0, width, height);
+    const Frame f{low_m, high_y_m, scale, 0.0, 0.0};
+    draw_world(svg, part_of(scene, low_m, high_m), f, height);
+    draw_path(svg, inside, f, coloured);
+    draw_ends(svg, scene, f);
+    svg.add("</svg>");
+    left += half + 20.0;
+    tallest = std::max(tallest, height);
+  }
+  return tallest + 44.0;
+}
+
 }  // namespace
 
 std::string mission_svg(const Scene& scene, std::span<const MissionReport> missions, PathColour colour) {
   Svg svg;
   const Vector3 size = scene.bounds_W.size();
-  const double scale = std::min((kWidth - kLeft - kRight) / size.x(), kMaxPanel / size.y());
+  const double scale = std::min((kPictureWidth - kLeft - kRight) / size.x(), kMaxPanel / size.y());
   const double panel = size.y() * scale;
   const double right = kLeft + size.x() * scale;
-  const double width = std::max(kLeastWidth, right + kRight);
   double top_mps = 1.0;
   for (const MissionReport& m : missions) top_mps = std::max(top_mps, std::ceil(m.result.max_velocity_mps));
 
-  svg.text(kLeft, 34, scene.title, "start", 18, kInk, "bold");
+  const std::string finding = finding_of(missions);
+  draw_titles(svg, finding, scene, kLeft);
   const Quantity coloured = quantity(colour, missions);
-  draw_legend(svg, coloured, width - kRight, 48);
-  double y = 96;
+  draw_legend(svg, coloured, kPictureWidth - kRight, 58);
+  double y = 106;
   for (std::size_t i = 0; i < missions.size(); ++i) {
     const MissionResult& r = missions[i].result;
     svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="12" height="12" rx="2" fill="{}"/>)", kLeft, y - 11,
             kDesignColour[i % kDesignColour.size()]);
     svg.text(kLeft + 18, y, r.design, "start", 15, kInk, "bold");
     svg.text(
-        kLeft + 130, y,
+        kLeft + 110, y,
         fmt::format("{} in {:.0f} s, mean {:.2f} m/s, {:.0f} kJ, {} decisions of {:.2f} s median, {} late",
                     outcome(r), r.mission_time_s, r.mean_velocity_mps, r.energy_kJ, r.decisions,
                     r.latency_s.median, r.deadline_misses),
@@ -94,8 +146,9 @@ std::string mission_svg(const Scene& scene, std::span<const MissionReport> missi
     draw_world(svg, scene, f, panel);
     draw_path(svg, missions[i], f, coloured);
     draw_ends(svg, scene, f);
-    y += panel + 62;
+    y += panel + 52;
   }
+  if (!missions.empty()) y += draw_zooms(svg, scene, missions.front(), coloured, y);
   const Frame charts{scene.bounds_W.min_W.x(), 0.0, scale, kLeft, 0.0};
   double longest_s = 1.0;
   for (const MissionReport& m : missions) longest_s = std::max(longest_s, m.result.latency_s.max);
@@ -113,30 +166,33 @@ std::string mission_svg(const Scene& scene, std::span<const MissionReport> missi
            "charts: over the way from start to goal, colours as the squares above; dark: "
            "obstacles; red: congestion",
            "start", 12, kSoft);
-  return svg.finish(width, y + 4);
+  return svg.finish(
+      y + 4, finding,
+      "The world from above with the path of each design, its congested ends larger, and speed, "
+      "latency and precision over the way. " +
+          scene.title);
 }
 
 std::string maps_svg(const Scene& scene, std::span<const MissionReport> missions) {
   Svg svg;
-  svg.text(kLeft, 34, scene.title, "start", 18, kInk, "bold");
-  constexpr double kGap = 70.0;
+  const std::string finding = finding_of(missions);
+  draw_titles(svg, finding, scene, kLeft);
+  constexpr double kGap = 60.0;
   const auto columns = static_cast<double>(std::max<std::size_t>(missions.size(), 1));
-  const double width = (kWidth - kLeft - kRight - kGap * (columns - 1.0)) / columns;
+  const double width = (kPictureWidth - kLeft - kRight - kGap * (columns - 1.0)) / columns;
   const Vector3 size = scene.bounds_W.size();
   const double scale = std::min(width / size.x(), kMaxPanel / size.y());
   const double height = size.y() * scale;
   const auto left = [&](std::size_t i) { return kLeft + (width + kGap) * static_cast<double>(i); };
   for (std::size_t i = 0; i < missions.size(); ++i) {
     const MissionResult& r = missions[i].result;
-    svg.text(left(i), 62,
-             fmt::format("{}: {} in {:.0f} s, mean {:.2f} m/s", r.design, outcome(r), r.mission_time_s,
-                         r.mean_velocity_mps),
-             "start", 15, kInk, "bold");
+    svg.text(left(i), 72, fmt::format("{}, mean {:.2f} m/s", r.design, r.mean_velocity_mps), "start", 13,
+             kInk, "bold");
   }
-  double y = 110.0;
+  double y = 118.0;
   for (std::size_t k = 0; k < kPathColourName.size(); ++k) {
     const Quantity q = quantity(static_cast<PathColour>(k), missions);
-    draw_legend(svg, q, kWidth - kRight, y - 28.0);
+    draw_legend(svg, q, kPictureWidth - kRight, y - 28.0);
     for (std::size_t i = 0; i < missions.size(); ++i) {
       const Frame f{scene.bounds_W.min_W.x(), scene.bounds_W.max_W.y(), scale, left(i), y + 4.0};
       draw_world(svg, scene, f, height);
@@ -145,7 +201,11 @@ std::string maps_svg(const Scene& scene, std::span<const MissionReport> missions
     }
     y += height + 76.0;
   }
-  return svg.finish(kWidth, y - 28.0);
+  return svg.finish(
+      y - 28.0, finding,
+      "The same paths from above, coloured in turn by speed, precision, volume, latency, visibility "
+      "and deadline. " +
+          scene.title);
 }
 
 }  // namespace roborun::report

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "platform/report/svg.hpp"
 #include "platform/report/sweep_sensitivity.hpp"
@@ -13,7 +14,7 @@
 namespace roborun::report {
 namespace {
 
-constexpr const char* kGrid = "#e4e7eb";
+constexpr double kLeft = 50.0;
 constexpr std::array<const char*, 6> kDesignColour{"#0072b2", "#d55e00", "#009e73",
                                                    "#cc79a7", "#e69f00", "#56b4e9"};
 constexpr std::array<const char*, core::kStageCount> kStageColour{"#7b8794", "#cc79a7", "#0072b2",
@@ -154,7 +155,7 @@ void draw_sensitivity(Svg& svg, const std::vector<SweepRow>& rows, const std::st
     }
   }
   if (!(high > 0.0 && low > 0.0)) low = high = 1.0;
-  const Panel panel{left, top, 270.0, 180.0, low / 1.6, high * 1.6, true};
+  const Panel panel{left, top, 205.0, 180.0, low / 1.6, high * 1.6, true};
   panel.draw(svg, fmt::format("{} over {}", metric.name, knob.name));
   const auto x = [&](std::size_t i) {
     return panel.left + panel.width * (0.1 + 0.4 * static_cast<double>(i));  // three values
@@ -181,18 +182,55 @@ void draw_sensitivity(Svg& svg, const std::vector<SweepRow>& rows, const std::st
     std::string ratio = fmt::format("{:.2f}x", points.back().mean / points.front().mean);
     const auto p = published(designs[d]);
     if (p && metric.printed) ratio += fmt::format(" [{:g}x]", knob.printed_ratio(*p));
-    svg.text(panel.left + 4.0 + 90.0 * static_cast<double>(d), panel.top + panel.height + 33.0, ratio,
+    svg.text(panel.left + 4.0 + 85.0 * static_cast<double>(d), panel.top + panel.height + 33.0, ratio,
              "start", 12, colour_of(d), "bold");
   }
 }
 
-void draw_key(Svg& svg, const std::vector<std::string>& names, double left, double y) {
-  for (std::size_t i = 0; i < names.size(); ++i) {
+/// A line for each name; returns where the next line would be.
+double draw_key(Svg& svg, const std::vector<std::string>& names, double left, double y) {
+  for (std::size_t i = 0; i < names.size(); ++i, y += 18.0) {
     svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="12" height="12" rx="2" fill="{}"/>)", left, y - 11.0,
             colour_of(i));
     svg.text(left + 18.0, y, names[i], "start", 13);
-    left += 40.0 + 8.0 * static_cast<double>(names[i].size());
   }
+  return y;
+}
+
+/// What the bars show first: who is faster than whom.
+std::string finding_of(const std::vector<DesignSummary>& summaries) {
+  std::vector<const DesignSummary*> flown;
+  for (const DesignSummary& s : summaries)
+    if (std::isfinite(s.velocity_mps.mean) && s.velocity_mps.mean > 0.0) flown.push_back(&s);
+  if (flown.empty()) return "No mission reached its goal";
+  const auto [slowest, fastest] = std::minmax_element(
+      flown.begin(), flown.end(),
+      [](const auto* a, const auto* b) { return a->velocity_mps.mean < b->velocity_mps.mean; });
+  const auto name = [](const DesignSummary& s) { return fmt::format("{} ({})", s.design, s.profile); };
+  if (flown.size() == 1)
+    return fmt::format("{} flies {:.2f} m/s", name(*flown.front()), flown.front()->velocity_mps.mean);
+  return fmt::format("{} flies {:.1f} times as fast as {}", name(**fastest),
+                     (*fastest)->velocity_mps.mean / (*slowest)->velocity_mps.mean, name(**slowest));
+}
+
+/// The knob that costs a design most time.
+std::string finding_of(const std::vector<SweepRow>& rows, const std::string& profile) {
+  std::string finding = "No two missions differ in one knob alone";
+  double most = 0.0;
+  for (const std::string& design : designs_of(rows, profile)) {
+    for (const Knob& knob : kKnobs) {
+      const Sensitivity s = sensitivity_of(rows, profile, design, knob);
+      if (s.at.front().empty() || s.at.back().empty()) continue;
+      const double ratio =
+          estimate(s.at.back(), mission_time).mean / estimate(s.at.front(), mission_time).mean;
+      if (!(ratio > most)) continue;
+      most = ratio;
+      const std::string name(knob.name);
+      finding = fmt::format("What costs most is {}: {} takes {:.2f} times as long at its highest",
+                            name.substr(0, name.find(',')), design, ratio);
+    }
+  }
+  return finding;
 }
 
 /// Time axis of one flight.
@@ -232,6 +270,21 @@ void draw_stages(Svg& svg, const MissionReport& flight, const TimeAxis& axis, co
   }
 }
 
+/// The stage that the first of some flights spends most time in.
+std::string finding_of(std::span<const MissionReport> flights) {
+  if (flights.empty()) return "No flight";
+  std::array<double, core::kStageCount> spent_s{};
+  double whole_s = 0.0;
+  for (const DecisionRecord& d : flights.front().decisions) {
+    for (std::size_t i = 0; i < core::kStageCount; ++i) spent_s[i] += d.stage_s[i];
+    whole_s = std::accumulate(spent_s.begin(), spent_s.end(), 0.0);
+  }
+  const auto most = std::max_element(spent_s.begin(), spent_s.end());
+  return fmt::format("{} spends most of its time in the stage {}: {:.0f} %", flights.front().result.design,
+                     core::to_string(static_cast<core::StageId>(most - spent_s.begin())),
+                     whole_s > 0.0 ? 100.0 * *most / whole_s : 0.0);
+}
+
 std::size_t zone_of(const DecisionRecord& d, const std::vector<double>& borders_m) {
   return static_cast<std::size_t>(std::count_if(borders_m.begin(), borders_m.end(),
                                                 [&d](double border_m) { return d.p_WB.x() >= border_m; }));
@@ -253,8 +306,8 @@ void draw_zones(Svg& svg, const MissionReport& flight, const std::vector<double>
     }
   }
   const double high_s = std::max(0.1, 1.1 * *std::max_element(whole_s.begin(), whole_s.end()));
-  const Panel panel{left, top, 240.0, 358.0, 0.0, high_s, false};
-  panel.draw(svg, "mean latency by zone, s");
+  const Panel panel{left, top, 150.0, 358.0, 0.0, high_s, false};
+  panel.draw(svg, "mean by zone, s");
   const double place = panel.width / static_cast<double>(zones);
   for (std::size_t zone = 0; zone < zones; ++zone) {
     const double x = panel.left + place * (static_cast<double>(zone) + 0.2);
@@ -290,49 +343,56 @@ std::string overall_svg(const std::vector<SweepRow>& rows) {
   for (const DesignSummary& s : summaries)
     names.push_back(fmt::format("{}, {}: {} of {} reached, {} collided", s.design, s.profile, s.reached,
                                 s.missions, s.collided));
-  draw_key(svg, names, 30.0, 28.0);
+  constexpr std::size_t kColumns = 3;
+  constexpr double kRow = 320.0;
+  const std::string finding = finding_of(summaries);
+  svg.text(kLeft, 26.0, finding, "start", 15, kInk, "bold");
+  double y = draw_key(svg, names, kLeft, 52.0) + 24.0;
   for (std::size_t i = 0; i < bars.size() && !summaries.empty(); ++i)
-    draw_bars(svg, summaries, bars[i], 60.0 + 260.0 * static_cast<double>(i), 70.0);
-  svg.text(
-      30.0, 364.0,
+    draw_bars(svg, summaries, bars[i], kLeft + 265.0 * static_cast<double>(i % kColumns),
+              y + kRow * static_cast<double>(i / kColumns));
+  y += 2.0 * kRow - 20.0;
+  const std::string key =
       "bars: means over the missions that reached the goal; whiskers: 95 % interval over seeds; dashes and "
-      "[ ]: published",
-      "start", 12, kSoft);
-  return svg.finish(std::max(1330.0, 60.0 + 430.0 * static_cast<double>(names.size())), 380.0);
+      "[ ]: published";
+  svg.text(kLeft, y, key, "start", 12, kSoft);
+  return svg.finish(y + 16.0, finding,
+                    "Means by design: velocity, mission time, energy, latency. " + key + ".");
 }
 
 std::string sensitivity_svg(const std::vector<SweepRow>& rows, const std::string& profile) {
-  constexpr std::array<Metric, 3> kMetrics{{{"mission time, s,", mission_time, true},
+  constexpr std::array<Metric, 3> kMetrics{{{"time, s,", mission_time, true},
                                             {"velocity, m/s,", velocity, false},
                                             {"energy, kJ,", energy, false}}};
   Svg svg;
-  draw_key(svg, designs_of(rows, profile), 60.0, 28.0);
-  for (std::size_t m = 0; m < kMetrics.size(); ++m) {
+  const std::string finding = finding_of(rows, profile);
+  svg.text(kLeft, 26.0, finding, "start", 15, kInk, "bold");
+  double y = draw_key(svg, designs_of(rows, profile), kLeft, 52.0) + 24.0;
+  for (const Metric& metric : kMetrics) {
     for (std::size_t k = 0; k < kKnobs.size(); ++k)
-      draw_sensitivity(svg, rows, profile, kKnobs[k], kMetrics[m], 60.0 + 350.0 * static_cast<double>(k),
-                       70.0 + 260.0 * static_cast<double>(m));
+      draw_sensitivity(svg, rows, profile, kKnobs[k], metric, kLeft + 255.0 * static_cast<double>(k), y);
+    y += 260.0;
   }
-  svg.text(60.0, 850.0,
-           "only missions that differ in nothing but the knob; below each chart: highest knob against "
-           "lowest, [ ]: "
-           "published; whiskers: 95 % interval over seeds",
+  svg.text(kLeft, y, "only missions that differ in nothing but the knob; whiskers: 95 % interval over seeds;",
            "start", 12, kSoft);
-  return svg.finish(1100.0, 866.0);
+  svg.text(kLeft, y + 16.0, "below each chart: highest knob against lowest, [ ]: published", "start", 12,
+           kSoft);
+  return svg.finish(y + 32.0, finding, "Mission time, velocity and energy over each knob of an environment.");
 }
 
 std::string breakdown_svg(std::span<const MissionReport> flights, const std::vector<double>& zone_borders_m) {
-  constexpr double kWidth = 1400.0;
-  constexpr double kLeft = 60.0;
-  constexpr double kChart = 980.0;
+  constexpr double kChart = 530.0;
   Svg svg;
+  const std::string finding = finding_of(flights);
+  svg.text(kLeft, 26.0, finding, "start", 15, kInk, "bold");
   double key_x = kLeft;
   for (std::size_t i = 0; i < core::kStageCount; ++i) {
-    svg.add(R"(<rect x="{:.1f}" y="17" width="12" height="12" rx="2" fill="{}"/>)", key_x, kStageColour[i]);
-    svg.text(key_x + 18.0, 28.0, core::to_string(static_cast<core::StageId>(i)));
+    svg.add(R"(<rect x="{:.1f}" y="41" width="12" height="12" rx="2" fill="{}"/>)", key_x, kStageColour[i]);
+    svg.text(key_x + 18.0, 52.0, core::to_string(static_cast<core::StageId>(i)));
     key_x += 120.0;
   }
-  svg.text(key_x, 28.0, "line: deadline; dashed: borders of the zones");
-  double y = 100.0;
+  svg.text(kLeft, 72.0, "line: deadline; dashed: borders of the zones");
+  double y = 136.0;
   for (const MissionReport& flight : flights) {
     double last_s = 1.0;
     double longest_s = 0.1;
@@ -368,10 +428,13 @@ std::string breakdown_svg(std::span<const MissionReport> flights, const std::vec
     for (int i = 0; i * step_s <= last_s; ++i)
       svg.text(axis.x(i * step_s), latency.top + latency.height + 16.0, fmt::format("{:g} s", i * step_s),
                "middle", 11, kSoft);
-    draw_zones(svg, flight, zone_borders_m, kLeft + kChart + 70.0, y);
+    draw_zones(svg, flight, zone_borders_m, kLeft + kChart + 60.0, y);
     y += 452.0;
   }
-  return svg.finish(kWidth, y - 50.0);
+  return svg.finish(
+      y - 50.0, finding,
+      "Velocity, precision and latency by stage of each design over the time of its flight, and the mean "
+      "latency in each zone.");
 }
 
 }  // namespace roborun::report

@@ -440,7 +440,7 @@ std::string escaped(const std::string& text) {
 
 std::string way_svg(const World& world, double radius_m, const WayVerdict& verdict,
                     const std::string& title) {
-  constexpr double kPixels = 900.0;
+  constexpr double kPixels = 830.0;
   constexpr int kText = 20;
   const Vector3 low = world.bounds_W().min_W;
   const Vector3 size = world.bounds_W().size();
@@ -459,20 +459,26 @@ std::string way_svg(const World& world, double radius_m, const WayVerdict& verdi
     return fmt::format("<polyline points=\"{}\" fill=\"none\" {}/>\n", points, style);
   };
   const int panel = rows + kText;
-  std::string svg = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
-      "font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"{0}\" height=\"{1}\" fill=\"white\"/>\n"
-      "<text x=\"4\" y=\"15\">{2}: {3}</text>\n",
-      columns, kText + panel * static_cast<int>(heights.size()), escaped(title),
+  const std::string finding = fmt::format(
+      "{}: {}", escaped(title),
       verdict.way
           ? fmt::format("{:.1f} m, narrowest {:.2f} m (widest way dashed)", verdict.shortest_m,
                         verdict.narrowest_m)
           : fmt::format("no way for a radius of {:.2f} m; widest {:.2f} m", radius_m, verdict.narrowest_m));
+  std::string svg = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
+      "font-family=\"sans-serif\" font-size=\"13\">\n<title>{2}</title>\n<desc>The world from above, cut at "
+      "the "
+      "heights of start and goal: obstacles dark, what is too near to them grey, the shortest way and the "
+      "widest "
+      "one.</desc>\n<rect width=\"{0}\" height=\"{1}\" fill=\"white\"/>\n<text x=\"4\" y=\"15\">{2}</text>\n",
+      columns, kText + panel * static_cast<int>(heights.size()), finding);
   for (std::size_t i = 0; i < heights.size(); ++i) {
     svg += fmt::format(
-        "<g transform=\"translate(0 {})\">\n<text x=\"4\" y=\"13\">z = {:.2f} m</text>\n"
-        "<g transform=\"translate(0 {})\">\n",
-        kText + panel * static_cast<int>(i), heights[i], kText);
+        "<g transform=\"translate(0 {})\">\n<text x=\"4\" y=\"13\">z = {:.2f} m; x {:g} .. {:g} m, y {:g} .. "
+        "{:g} m</text>\n<g transform=\"translate(0 {})\">\n",
+        kText + panel * static_cast<int>(i), heights[i], low.x(), low.x() + size.x(), low.y(),
+        low.y() + size.y(), kText);
     svg += cut_svg(world, heights[i], radius_m, cell_m, columns, rows);
     svg += line(verdict.widest_W, "stroke=\"#e69f00\" stroke-dasharray=\"5 4\"");
     svg += line(verdict.way_W, "stroke=\"#0072b2\" stroke-width=\"2\"");

@@ -32,7 +32,9 @@ TEST(KnownSvg, DrawsRunsOfKnownCellsOnceAndLeavesTheRestUnknown) {
   EXPECT_EQ(test::count(svg, R"(fill="#e8f3ff"/>)"), 1U) << "two free cells in a row are one rectangle";
   EXPECT_EQ(test::count(svg, R"(fill="#d55e00"/>)"), 1U);
   EXPECT_NE(svg.find("width=\"830\""), std::string::npos);
-  EXPECT_NE(svg.find("<title>maze &amp; more</title>"), std::string::npos);
+  EXPECT_NE(svg.find("<title>aware reached the goal in "), std::string::npos) << "what it shows";
+  EXPECT_EQ(test::count(svg, "maze &amp; more"), 2U)
+      << "what it is of: below the title, and in the description";
   EXPECT_NE(svg.find("<desc>"), std::string::npos);
 }
 

@@ -35,6 +35,7 @@ TEST(MissionSvg, IsWellFormedSelfContainedAndDrawsWhatItIsGiven) {
   for (const PathColour colour : {PathColour::kSpeed, PathColour::kPrecision}) {
     const std::string svg = mission_svg(scene(), missions, colour);
     EXPECT_TRUE(well_formed(svg));
+    EXPECT_TRUE(test::is_for_pages(svg));
     EXPECT_EQ(svg.find("href"), std::string::npos) << "no external resources";
     EXPECT_GE(count(svg, "<circle"), 2U * 2U) << "pillars in each panel";
     EXPECT_NE(svg.find("static"), std::string::npos);
@@ -50,6 +51,7 @@ TEST(MapsSvg, ShowsEveryQuantityOfEveryMission) {
     missions[1].decisions[i].v0_m3 = 1e3 * static_cast<double>(i);
   const std::string svg = maps_svg(scene(), missions);
   EXPECT_TRUE(well_formed(svg));
+  EXPECT_TRUE(test::is_for_pages(svg));
   EXPECT_EQ(svg.find("nan"), std::string::npos);
   EXPECT_EQ(svg.find("inf"), std::string::npos);
   EXPECT_EQ(count(svg, "path: "), kPathColourName.size());
@@ -60,7 +62,10 @@ TEST(MapsSvg, ShowsEveryQuantityOfEveryMission) {
       mission_svg(scene(), std::vector<MissionReport>{missions[1]}, PathColour::kVolume);
   const std::string flat = mission_svg(scene(), std::vector<MissionReport>{missions[0]}, PathColour::kVolume);
   EXPECT_GT(count(by_volume, "stroke-width=\"2.6\""), 15U);
-  EXPECT_LE(count(flat, "stroke-width=\"2.6\""), 2U);
+  constexpr std::size_t kPlaces = 3;  // the world and its two ends
+  EXPECT_LE(count(flat, "stroke-width=\"2.6\""), 2U * kPlaces);
+  EXPECT_NE(flat.find(">zone A with static: "), std::string::npos);
+  EXPECT_NE(flat.find(">zone C with static: "), std::string::npos);
 }
 
 TEST(MissionSvg, SurvivesAMissionWithoutDecisionsAndAWorldWithoutAnything) {

@@ -35,8 +35,8 @@ std::vector<SweepRow> rows(std::uint64_t seeds) {
 
 /// Well formed, alone in its file, and no number that is none.
 bool sound(const std::string& svg) {
-  return well_formed(svg) && svg.find("href") == std::string::npos && svg.find("nan") == std::string::npos &&
-         svg.find("inf") == std::string::npos;
+  return well_formed(svg) && test::is_for_pages(svg) && svg.find("href") == std::string::npos &&
+         svg.find("nan") == std::string::npos && svg.find("inf") == std::string::npos;
 }
 
 constexpr const char* kWhisker = "stroke-width=\"1.4\"";
@@ -44,6 +44,7 @@ constexpr const char* kWhisker = "stroke-width=\"1.4\"";
 TEST(OverallSvg, DrawsABarADesignThePublishedValueAndIntervalsOnlyWithMoreSeeds) {
   const std::string one = overall_svg(rows(1));
   EXPECT_TRUE(sound(one));
+  EXPECT_EQ(count(one, "aware (paper) flies 6.8 times as fast as static (paper)"), 2U) << "4.1 and 0.6 m/s";
   EXPECT_EQ(count(one, "[2.5]"), 1U);
   EXPECT_EQ(count(one, "[2093]"), 1U);
   EXPECT_EQ(count(one, kWhisker), 0U);
@@ -60,6 +61,7 @@ TEST(SensitivitySvg, WritesTheRatioOfTheHighestKnobToTheLowestBesideThePublished
   }
   const std::string svg = sensitivity_svg(sut, "paper");
   EXPECT_TRUE(sound(svg));
+  EXPECT_EQ(count(svg, "What costs most is density: aware takes 1.50 times as long at its highest"), 2U);
   EXPECT_EQ(count(svg, "1.50x [1.5x]"), 1U);
   EXPECT_EQ(count(sensitivity_svg(rows(3), "paper"), kWhisker), 3U * 2U * 3U)
       << "metrics, designs, densities";
@@ -88,6 +90,7 @@ TEST(BreakdownSvg, DrawsEveryStageAndTheMeanOfEachZone) {
   }
   const std::string svg = breakdown_svg(std::vector<MissionReport>{flight}, {200.0, 700.0});
   EXPECT_TRUE(sound(svg));
+  EXPECT_EQ(count(svg, "aware spends most of its time in the stage map: 58 %"), 2U);
   EXPECT_EQ(count(svg, "A: 2.50"), 1U);
   EXPECT_EQ(count(svg, "B: 0.75"), 1U);
   EXPECT_EQ(count(svg, "C: 0.75"), 1U);

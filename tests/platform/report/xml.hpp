@@ -33,4 +33,12 @@ inline std::size_t count(const std::string& text, const std::string& what) {
   return n;
 }
 
+/// As all pictures of this project: as wide as a page shows it, with a title and a description, for light and dark screens.
+inline bool is_for_pages(const std::string& svg) {
+  return svg.find("width=\"830\"") != std::string::npos && svg.find("<title></title>") == std::string::npos &&
+         svg.find("<title>") != std::string::npos && svg.find("<desc></desc>") == std::string::npos &&
+         svg.find("<desc>") != std::string::npos &&
+         svg.find("prefers-color-scheme: dark") != std::string::npos;
+}
+
 }  // namespace roborun::test
