@@ -308,7 +308,7 @@ void DecisionPipeline::fit(core::StageBudget& budget, double radius_m, double sp
   }
 }
 
-void DecisionPipeline::leave(core::StageBudget& budget, DecisionOutput& out) noexcept {
+void DecisionPipeline::leave(double room_m, core::StageBudget& budget, DecisionOutput& out) noexcept {
   // What is flown ends in a stop: from there.
   if (draft_.start.v_W.norm() > kAtRest_mps || draft_.start.a_W.norm() > kAtRest_mps) return;
   const Permitted permitted(*this);
@@ -318,7 +318,7 @@ void DecisionPipeline::leave(core::StageBudget& budget, DecisionOutput& out) noe
   request.bounds_W = config_.flight_bounds_W;
   request.limits = limits(std::min(out.decision.point.speed_limit_mps, kLeaving_mps));
   request.body_m = config_.vehicle.radius_m;
-  request.room_m = radius_m();
+  request.room_m = room_m;
   meter_.charge_to(core::StageId::kSmoother);
   draft_.leaves = stages::find_way_out(request, permitted.view(), stages::FinestView(permitted.view()),
                                        budget, draft_.smoother_work, draft_.trajectory);
@@ -409,7 +409,7 @@ bool DecisionPipeline::may_squeeze() const noexcept {
 
 void DecisionPipeline::fit_narrow(core::StageBudget& budget, DecisionOutput& out) noexcept {
   const VehicleModel& vehicle = config_.vehicle;
-  if (out.planner_status == Status::kStartBlocked) return leave(budget, out);
+  if (out.planner_status == Status::kStartBlocked) return leave(slow_radius_m(vehicle), budget, out);
   fit(budget, slow_radius_m(vehicle), std::min(out.decision.point.speed_limit_mps, vehicle.slow_speed_mps),
       out);
   draft_.is_narrow = out.smoother_status == Status::kOk;
@@ -432,7 +432,7 @@ void DecisionPipeline::find_trajectory(const DecisionInput& in, core::StageBudge
   if (out.planner_status != Status::kStartBlocked)
     fit(budget, radius_m(), speed_mps, out);
   else if (!may_be_narrow)
-    leave(budget, out);
+    leave(radius_m(), budget, out);
   if (is_found() || was_narrow || !may_be_narrow) return;
   search(in, slow_radius_m(config_.vehicle), out);
   fit_narrow(budget, out);

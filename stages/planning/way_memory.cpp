@@ -362,7 +362,8 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   if (narrow_width_ < width_) find_places(cells, narrow_width_, 0, narrow);
   forbid(block, narrow);
   for (std::size_t i = 0; i < narrow.known.size(); ++i)
-    places.doubtful[i] = static_cast<std::uint16_t>(narrow.known[i] & ~places.known[i] & ~places.open[i]);
+    places.doubtful[i] =
+        static_cast<std::uint16_t>((narrow.known[i] | narrow.open[i]) & ~places.known[i] & ~places.open[i]);
   number_rooms(places, b->rooms);
   b->passable = passable;
 }

@@ -94,20 +94,27 @@ bool find_way_out(const WayOutRequest& request, const MapView& view, const MapVi
   const Aabb body_W = Aabb::around(request.start_W, request.body_m);
   const StandingView standing(polled_known, body_W);
   const bool touches = !polled_known.is_free(body_W, work.units);
-  for (int i = 1; i <= kDistances; ++i) {
-    for (const auto& d : kDirection) {
-      if (polled.spent()) return false;
-      const Piece piece{request.start_W, Vector3(d[0], d[1], d[2]).normalized(), kDistance_m * i};
-      const Vector3 end_W = piece.at_W(piece.length_m);
-      Trajectory line;
-      line.start_time = request.start_time;
-      if (!request.bounds_W.contains(end_W) || !is_ball_free(polled, end_W, request.room_m, work.units) ||
-          !append_rest_to_rest(request.start_W, end_W, request.limits, line) ||
-          !is_trajectory_free(standing, line, 0.0, request.body_m, work.units) ||
-          (touches && !keeps_off_all(piece, polled_known, request.body_m, work.units)))
-        continue;
-      out = line;
-      return true;
+  const auto is_out = [&](const Vector3& end_W, bool with_room) {
+    return with_room ? is_ball_free(polled, end_W, request.room_m, work.units)
+                     : is_ball_free(polled_known, end_W, request.body_m, work.units);
+  };
+  for (const bool with_room : {true, false}) {
+    if (!with_room && !touches) return false;
+    for (int i = 1; i <= kDistances; ++i) {
+      for (const auto& d : kDirection) {
+        if (polled.spent()) return false;
+        const Piece piece{request.start_W, Vector3(d[0], d[1], d[2]).normalized(), kDistance_m * i};
+        const Vector3 end_W = piece.at_W(piece.length_m);
+        Trajectory line;
+        line.start_time = request.start_time;
+        if (!request.bounds_W.contains(end_W) || !is_out(end_W, with_room) ||
+            !append_rest_to_rest(request.start_W, end_W, request.limits, line) ||
+            !is_trajectory_free(standing, line, 0.0, request.body_m, work.units) ||
+            (touches && !keeps_off_all(piece, polled_known, request.body_m, work.units)))
+          continue;
+        out = line;
+        return true;
+      }
     }
   }
   return false;

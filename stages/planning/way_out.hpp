@@ -43,13 +43,14 @@ struct WayOutRequest {
   MotionLimits limits{};  ///< Of the trajectory.
   double
       body_m{};  ///< Radius of the vehicle: nothing that is not free comes nearer to it than this, or than it is.
-  double room_m{};  ///< Radius that is free at the end.
+  double room_m{};  ///< Radius that is free at a place with room.
 };
 
-/// A straight line to the nearest place with room, at most 2 m away, from rest to rest. `known` is the map at its finest,
+/// A straight line to the nearest place with room, at most 2 m away, from rest to rest; if none can be reached, but the vehicle's
+/// box touches something, to the nearest place where the vehicle's own radius is free. `known` is the map at its finest,
 /// `view` what plans are made in. On the way the vehicle's box leaves what it touches (StandingView), and of what is
 /// inside the vehicle's radius everything comes no nearer. False, and `out` untouched, if there is none, or if the budget
-/// is spent. RT-safe: at most 20 * 26 lines.
+/// is spent. RT-safe: at most 2 * 20 * 26 lines.
 [[nodiscard]] bool find_way_out(const WayOutRequest& request, const MapView& view, const MapView& known,
                                 core::StageBudget& budget, core::Work& work, Trajectory& out) noexcept;
 

@@ -72,6 +72,21 @@ TEST_F(WayOutTest, FindsRoomThatIsNarrowerThanACell) {
   EXPECT_TRUE(out_.end_W().isApprox(Vector3(0, -0.1, 5))) << out_.end_W().transpose();
 }
 
+TEST_F(WayOutTest, GoesAsideFirstWhereItIsTooNearForTheWayOut) {
+  box(-1, 0.92, 1, 2);
+  box(-1, -2, 1, -0.59);  // 1 cm inside the vehicle: on the way out of the slot it would come nearer
+  ASSERT_TRUE(leaves());
+  EXPECT_TRUE(out_.end_W().isApprox(Vector3(0, 0.1, 5))) << out_.end_W().transpose();
+  EXPECT_GE(nearest_m(0.0), 0.59 - 1e-9);
+  request_.start_W = out_.end_W();
+  ASSERT_TRUE(leaves());
+  EXPECT_GE(std::fabs(out_.end_W().x()), 1.5);
+  EXPECT_GE(nearest_m(0.0), 0.6);
+  view_.occupied.back().max_W.y() = -0.2;  // 1.12 m between them: nowhere is there room for its radius
+  request_.start_W = Vector3(0, 0, 5);
+  EXPECT_FALSE(leaves());
+}
+
 TEST_F(WayOutTest, NeverThroughWhatIsOccupiedOrUnknownWithTheVehiclesRadius) {
   // Room behind a gap that is narrower than the vehicle.
   box(-0.7, -20, -0.65, -0.5), box(-0.7, 0.5, -0.65, 20);
