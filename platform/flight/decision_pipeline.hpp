@@ -184,7 +184,7 @@ class DecisionPipeline {
   void fit_narrow(core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// From the search of plan() on, with less and less room.
   void find_trajectory(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
-  /// From rest, out of where no search has room: slowly, with the vehicle's own radius.
+  /// From rest, out of where no search has room to where `room_m` is free: slowly, with the vehicle's own radius.
   void leave(double room_m, core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// Of a vehicle that turns: where no way is found, it looks at what is unknown on the way, and after a while from farther
   /// off: what is near, above and below its view is never seen from there.

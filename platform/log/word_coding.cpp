@@ -294,7 +294,7 @@ void append_decoded_words(std::string& to, std::size_t count, const WordLayout& 
   bits.remove_prefix(get.taken());
   if (form == kBits) return;
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint64_t word = load<std::uint32_t>(written, i);
+    const std::uint64_t word = word_at(written, 4, i);
     if (run_of(word) != Run::kNumbers) continue;
     const std::uint32_t depth = word_of_thousandths(static_cast<std::uint32_t>(word));
     std::memcpy(words + sizeof depth * i, &depth, sizeof depth);

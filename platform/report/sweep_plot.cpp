@@ -274,11 +274,10 @@ void draw_stages(Svg& svg, const MissionReport& flight, const TimeAxis& axis, co
 std::string finding_of(std::span<const MissionReport> flights) {
   if (flights.empty()) return "No flight";
   std::array<double, core::kStageCount> spent_s{};
-  double whole_s = 0.0;
   for (const DecisionRecord& d : flights.front().decisions) {
     for (std::size_t i = 0; i < core::kStageCount; ++i) spent_s[i] += d.stage_s[i];
-    whole_s = std::accumulate(spent_s.begin(), spent_s.end(), 0.0);
   }
+  const double whole_s = std::accumulate(spent_s.begin(), spent_s.end(), 0.0);
   const auto most = std::max_element(spent_s.begin(), spent_s.end());
   return fmt::format("{} spends most of its time in the stage {}: {:.0f} %", flights.front().result.design,
                      core::to_string(static_cast<core::StageId>(most - spent_s.begin())),

@@ -1,13 +1,8 @@
 #!/usr/bin/env bash
 # What the program writes: whole or not at all, never over what it reads, and nothing is lost silently. Exit codes of all commands.
 set -u
-. "$(dirname "$0")/../../support/checks.sh"
-roborun=$1
-data=$2
 vehicles=$(cd "$(dirname "$0")/../../../platform/vehicle" && pwd)
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
+. "$(dirname "$0")/../../support/cli.sh"
 # refuses WANTED COMMAND...: exit code 2, one line on standard error that says it
 refuses() {
   local wanted=$1 code

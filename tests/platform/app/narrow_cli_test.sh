@@ -2,12 +2,7 @@
 # Windows 0.4 m wider than the vehicle, on a board of 2026-11-26: the first one was seen once, at a slant, with some of its cells not known.
 # Where there is no other way, such a place is looked at again.
 set -u
-. "$(dirname "$0")/../../support/checks.sh"
-roborun=$1
-data=$2
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
+. "$(dirname "$0")/../../support/cli.sh"
 for seed in 64 65; do
   "$roborun" world make windows --seed $seed --vehicle paper --out windows.toml || exit 1
   "$roborun" fly --world windows.toml --vehicle paper --seed $seed --profile "$data/host_board.toml" --json >out 2>err

@@ -1,12 +1,7 @@
 #!/usr/bin/env bash
 # roborun replay --from, --what-if, and roborun report FOLDER, by what they print and write.
 set -u
-. "$(dirname "$0")/../../support/checks.sh"
-roborun=$1
-data=$2
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
+. "$(dirname "$0")/../../support/cli.sh"
 export XDG_CACHE_HOME=$work/cache
 exits() { # CODE COMMAND...
   local wanted=$1 code
