@@ -43,13 +43,12 @@ std::vector<std::string> scenarios_in(const std::string& folder) {
       files.push_back(entry.path().string());
   }
   std::sort(files.begin(), files.end());
-  std::erase_if(files, [](const std::string& file) {
-    const bool foreign = !mission::is_scenario(file);
-    if (foreign) fmt::print(stderr, "roborun: {}: skipped: no scenario (no [scenario] in it)\n", file);
-    return foreign;
-  });
-  if (files.empty())
+  const auto foreign = std::stable_partition(files.begin(), files.end(), mission::is_scenario);
+  if (foreign == files.begin())
     throw InputError(fmt::format("{}: no scenario in it: must hold .toml files with [scenario]", folder));
+  for (auto file = foreign; file != files.end(); ++file)
+    fmt::print(stderr, "roborun: {}: skipped: no scenario (no [scenario] in it)\n", *file);
+  files.erase(foreign, files.end());
   return files;
 }
 
