@@ -46,7 +46,7 @@ class FlightMemory {
   };
   /// The blocks are the caller's, and not constant: apply() writes them.
   void add(std::span<const std::byte> block, bool has_addresses) {
-    auto* const first = reinterpret_cast<std::uint64_t*>(const_cast<std::byte*>(block.data()));
+    auto* const first = static_cast<std::uint64_t*>(static_cast<void*>(const_cast<std::byte*>(block.data())));
     block_.push_back({first, block.size() / sizeof(std::uint64_t), has_addresses, {}});
   }
   [[nodiscard]] std::optional<Place> place_of(std::uint64_t word) const;

@@ -111,12 +111,12 @@ bool PortReader::look(std::uint64_t& written) noexcept {
 
 bool PortReader::copy(std::uint64_t n, PortSample& out) noexcept {
   const std::byte* at = memory_.data() + sizeof(roborun_port_header) + (n % slot_count_) * slot_bytes_;
-  const auto& slot = *reinterpret_cast<const roborun_port_slot*>(at);
+  const auto& slot = *static_cast<const roborun_port_slot*>(static_cast<const void*>(at));
   if (load(slot.guard, __ATOMIC_ACQUIRE) != 2 * n + 2) return false;
   const std::uint32_t bytes = load(slot.payload_bytes, __ATOMIC_RELAXED);
   const std::uint32_t room = payload_room_bytes();
   const std::uint32_t taken = bytes <= room ? bytes : 0;
-  const auto* word = reinterpret_cast<const std::uint64_t*>(at + sizeof slot);
+  const auto* word = static_cast<const std::uint64_t*>(static_cast<const void*>(at + sizeof slot));
   const std::size_t words = (sample_bytes_ + taken + 7) / 8;
   for (std::size_t i = 0; i < words; ++i) copy_[i] = load(word[i], __ATOMIC_RELAXED);
   const std::int64_t offset_ns = load(header().clock_offset_ns, __ATOMIC_RELAXED);

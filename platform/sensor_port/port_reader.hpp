@@ -57,7 +57,7 @@ class PortReader {
  private:
   [[nodiscard]] std::string check_layout();
   [[nodiscard]] const roborun_port_header& header() const noexcept {
-    return *reinterpret_cast<const roborun_port_header*>(memory_.data());
+    return *static_cast<const roborun_port_header*>(static_cast<const void*>(memory_.data()));
   }
   /// How many samples there are, after a look at who writes. False: nothing to read.
   [[nodiscard]] bool look(std::uint64_t& written) noexcept;

@@ -33,6 +33,9 @@ elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
   add_compile_options(-mbranch-protection=standard)
 endif()
 add_link_options(-Wl,-z,relro -Wl,-z,now)
+if(CMAKE_SIZEOF_VOID_P EQUAL 4)
+  add_compile_definitions(_FILE_OFFSET_BITS=64)  # logs and sizes that are checked go beyond 2 GiB there, too
+endif()
 
 # Libraries are position-independent, because plugins are shared objects that bring their own copy of what they call
 # (platform/board/plugin.hpp). Without semantic interposition the code is that of a program.

@@ -116,7 +116,8 @@ void wet(std::uint64_t number, const firmware_if::DepthFrame& frame, std::vector
   core::CounterRng lens(number % 8, 44);
   const std::size_t radius = frame.width / 12U;
   for (std::size_t k = 0; k < kDropsOnLens; ++k) {
-    const std::size_t u0 = lens.below(frame.width), v0 = lens.below(frame.height);
+    const auto u0 = static_cast<std::size_t>(lens.below(frame.width));
+    const auto v0 = static_cast<std::size_t>(lens.below(frame.height));
     for (std::size_t v = v0 - std::min(v0, radius); v < std::min<std::size_t>(v0 + radius, frame.height); ++v)
       for (std::size_t u = u0 - std::min(u0, radius); u < std::min<std::size_t>(u0 + radius, frame.width);
            ++u)

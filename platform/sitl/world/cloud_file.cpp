@@ -141,7 +141,7 @@ PcdHeader read_pcd_header(Bytes bytes, const std::string& name) {
   return header;
 }
 
-void need_points(std::size_t there, std::size_t record, std::size_t points, const std::string& name) {
+void need_points(std::size_t there, std::size_t record, std::uint64_t points, const std::string& name) {
   if (points > there / record)
     refuse(name, fmt::format("truncated: {} points of {} bytes are announced, {} bytes are there", points,
                              record, there));
@@ -433,7 +433,7 @@ Geometry parse_las(Bytes bytes, const std::string& name) {
     offset[i] = value_at<double>(bytes, 155 + 8 * static_cast<std::size_t>(i));
   }
   Geometry cloud;
-  cloud.points.reserve(points);
+  cloud.points.reserve(static_cast<std::size_t>(points));
   for (std::size_t n = 0; n < points; ++n) {
     Vector3 p;
     for (int i = 0; i < 3; ++i)

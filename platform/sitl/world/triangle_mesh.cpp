@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "platform/sitl/world/ray_span.hpp"
 #include "platform/sitl/world/voxel_grid.hpp"
@@ -113,7 +114,8 @@ void TriangleMesh::build(std::vector<std::uint32_t>& order, const std::vector<Tr
     (void)box.size().maxCoeff(&axis);
     const std::uint32_t half = count / 2;
     // Ties by number: the same tree on every machine.
-    std::nth_element(order.begin() + first, order.begin() + first + half, order.begin() + first + count,
+    const auto part = std::span(order).subspan(first, count);
+    std::nth_element(part.begin(), part.begin() + static_cast<std::ptrdiff_t>(half), part.end(),
                      [&](std::uint32_t x, std::uint32_t y) {
                        const double mx = middle_of(x, axis);
                        const double my = middle_of(y, axis);

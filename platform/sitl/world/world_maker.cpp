@@ -99,7 +99,7 @@ WorldDescription make_maze(CounterRng& rng, double width_m) {
       way.pop_back();
       continue;
     }
-    const auto [nx, ny] = next[rng.below(static_cast<std::uint32_t>(next.size()))];
+    const auto [nx, ny] = next[static_cast<std::size_t>(rng.below(next.size()))];
     at(wall, std::min(x, nx), std::min(y, ny))[nx != x ? 0 : 1] = false;
     at(seen, nx, ny) = true;
     way.emplace_back(nx, ny);
@@ -172,7 +172,7 @@ WorldDescription make_wires(CounterRng& rng, double spacing_m) {
     const double at_m = x_m + between(rng, -0.25, 0.25) * spacing_m;
     const double z_m = between(rng, kLow_m + 0.5, kHigh_m - 0.5);
     constexpr std::array<double, 3> kRadius_m{0.01, 0.025, 0.05};
-    const double r = kRadius_m[rng.below(3)];
+    const double r = kRadius_m[static_cast<std::size_t>(rng.below(kRadius_m.size()))];
     world.boxes.push_back({{at_m - r, -16.0, z_m - r}, {at_m + r, 16.0, z_m + r}});
   }
   return world;
