@@ -29,8 +29,7 @@ constexpr Nanos kThinLasts{5'000'000'000};
 /// Of the vehicle's speed: what known way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
 constexpr double kBeyond = 0.5;
 
-/// Of depths, in any of the images.
-DepthError worst_error(std::span<const stages::PosedDepthFrame> frames) noexcept {
+DepthError worst_depth_error(std::span<const stages::PosedDepthFrame> frames) noexcept {
   DepthError worst{.constant_m = 0.0, .quadratic_per_m = 0.0};
   for (const stages::PosedDepthFrame& frame : frames) {
     worst.constant_m = std::fmax(worst.constant_m, frame.error.constant_m);
@@ -146,8 +145,8 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   stages::CloudNeed need = stages::needed_points(profiler, in.p_WB, relevant_W);
   need.reach_m = std::fmax(need.reach_m, MotionWatch::kReach_m);
   (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), need, budget, work);
-  motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W, worst_error(in.frames)}, cloud_.points(), map_.view(),
-                budget, work);
+  motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W, worst_depth_error(in.frames)}, cloud_.points(),
+                map_.view(), budget, work);
   bodies_.observe(in.now, in.p_WB, motion_.appeared_W());
   bodies_.follow(in.now, in.p_WB, cloud_.points());
   out.motion = motion_.moving(in.now) || bodies_.near(in.now, in.p_WB, in.v_WB, MotionWatch::kReach_m);
@@ -473,6 +472,7 @@ void DecisionPipeline::forget() noexcept {
   bodies_ = {};
   dodges_at_ = MonotonicTime::min();
   thin_until_ = {};
+  viewpoints_ = {};
   kept_W_.clear();
   look_W_.reset();
   has_planned_ = false;

@@ -19,6 +19,7 @@
 #include "governor/policy/decision_policy.hpp"
 #include "platform/flight/body_tracks.hpp"
 #include "platform/flight/motion_watch.hpp"
+#include "platform/flight/viewpoints.hpp"
 #include "stages/perception/cloud_images.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/perception/point_cloud.hpp"
@@ -186,11 +187,14 @@ class DecisionPipeline {
   void find_trajectory(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// From rest, out of where no search has room to where `room_m` is free: slowly, with the vehicle's own radius.
   void leave(double room_m, core::StageBudget& budget, DecisionOutput& out) noexcept;
-  /// Of a vehicle that turns: where no way is found, it looks at what is unknown on the way, and after a while from farther
-  /// off: what is near, above and below its view is never seen from there.
+  /// Of a vehicle that turns: where no way is found, it looks at what is unknown on the way, and after a while from elsewhere.
   void look_on(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
-  /// The first unknown place on the way to the goal.
+  /// Where the known part of the way to the goal ends.
+  [[nodiscard]] std::optional<Vector3> known_end_W() const noexcept;
+  /// What it looks at: that place, or from there on the goal.
   [[nodiscard]] Vector3 undecided_W(const DecisionInput& in) const noexcept;
+  /// From where it looks: whence most is seen of what is unknown around that place, or else from farther off.
+  [[nodiscard]] std::optional<Vector3> viewpoint_W() noexcept;
   /// Where what was found meets a body that moves: slower, a stop, or to the side, whatever meets none, or the latest.
   void give_way(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// Aside, a few metres in eight directions: the one that meets nothing and ends nearest to the goal. It begins where
@@ -230,9 +234,10 @@ class DecisionPipeline {
   std::optional<Vector3> look_W_{};  ///< What it looks at while it stands without a way, or steps back.
   MonotonicTime blocked_since_{};    ///< Standing without a way, and the looks so far led nowhere.
   MonotonicTime back_until_{};       ///< It steps back to look: nothing else is planned.
-  MonotonicTime thin_until_{};       ///< Something thin was seen less than kThinLasts before.
-  bool is_narrow_{false};            ///< What is flown was planned so.
-  int failures_{0};                  ///< Decisions in a row without a trajectory.
+  Viewpoints viewpoints_;
+  MonotonicTime thin_until_{};  ///< Something thin was seen less than kThinLasts before.
+  bool is_narrow_{false};       ///< What is flown was planned so.
+  int failures_{0};             ///< Decisions in a row without a trajectory.
 };
 
 }  // namespace roborun::flight

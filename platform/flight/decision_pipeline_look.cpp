@@ -4,6 +4,8 @@
 
 #include "core/geometry/math.hpp"
 #include "platform/flight/decision_pipeline.hpp"
+#include "stages/perception/polled_view.hpp"
+#include "stages/planning/fenced_view.hpp"
 
 namespace roborun::flight {
 namespace {
@@ -19,13 +21,38 @@ constexpr std::size_t kCorners = 32;
 
 }  // namespace
 
-Vector3 DecisionPipeline::undecided_W(const DecisionInput& in) const noexcept {
+std::optional<Vector3> DecisionPipeline::known_end_W() const noexcept {
   std::array<Vector3, kCorners> way_W;
   const std::size_t count =
       ways_known_ ? ways_->known_way(draft_.start.p_W, config_.horizon_m, way_W) : std::size_t{0};
-  if (count == 0) return in.goal_W;
-  const Vector3 offset = way_W[count - 1] - draft_.start.p_W;
-  return core::hypot2(offset.x(), offset.y()) > kHere_m ? way_W[count - 1] : in.goal_W;
+  return count > 0 ? std::optional(way_W[count - 1]) : std::nullopt;
+}
+
+Vector3 DecisionPipeline::undecided_W(const DecisionInput& in) const noexcept {
+  const Vector3 end_W = known_end_W().value_or(in.goal_W);
+  const Vector3 offset = end_W - draft_.start.p_W;
+  return core::hypot2(offset.x(), offset.y()) > kHere_m ? end_W : in.goal_W;
+}
+
+std::optional<Vector3> DecisionPipeline::viewpoint_W() noexcept {
+  if (const std::optional<Vector3> end_W = known_end_W()) {
+    const stages::FencedView fenced(map_.view(), config_.fence);
+    const stages::FinestView finest(fenced);
+    core::Work& work = draft_.planner_work;
+    const stages::PolledView view(finest, *draft_.planner_budget, work);
+    const auto to_W = viewpoints_.next(
+        view, {*end_W, slow_radius_m(config_.vehicle), config_.level_view_ratio, config_.flight_bounds_W},
+        work.units);
+    if (to_W) {
+      look_W_ = end_W;
+      return to_W;
+    }
+  }
+  Vector3 away_W = draft_.start.p_W - *look_W_;
+  away_W.z() = 0.0;
+  const double far_m = core::hypot2(away_W.x(), away_W.y());
+  if (!(far_m > kHere_m)) return std::nullopt;
+  return draft_.start.p_W + kStepBack_m / far_m * away_W;
 }
 
 void DecisionPipeline::look_on(const DecisionInput& in, core::StageBudget& budget,
@@ -39,14 +66,13 @@ void DecisionPipeline::look_on(const DecisionInput& in, core::StageBudget& budge
   look_W_ = undecided_W(in);
   if (in.now - blocked_since_ < kLookAgain) return;
   blocked_since_ = in.now;
-  Vector3 away_W = draft_.start.p_W - *look_W_;
-  away_W.z() = 0.0;
-  const double far_m = core::hypot2(away_W.x(), away_W.y());
-  if (!(far_m > kHere_m)) return;
+  meter_.charge_to(core::StageId::kPlanner);
+  const std::optional<Vector3> to_W = viewpoint_W();
+  if (!to_W) return;
   const double radius = slow_radius_m(config_.vehicle);
   const Status planned = out.planner_status;
   draft_.planner_work.volume_m3 = 0.0;
-  search_to(draft_.start.p_W + kStepBack_m / far_m * away_W, in, radius, out);
+  search_to(*to_W, in, radius, out);
   if (out.planner_status == Status::kOk) fit(budget, radius, kSlowly_mps, out);
   if (out.smoother_status == Status::kOk)
     back_until_ = draft_.trajectory.start_time + from_seconds(draft_.trajectory.duration_s()) + kSettles;
