@@ -37,7 +37,7 @@ std::uint32_t crc32(std::string_view bytes, std::uint32_t before) noexcept {
     crc = kTable[7][word & 0xFFU] ^ kTable[6][(word >> 8U) & 0xFFU] ^ kTable[5][(word >> 16U) & 0xFFU] ^
           kTable[4][(word >> 24U) & 0xFFU] ^ kTable[3][(word >> 32U) & 0xFFU] ^
           kTable[2][(word >> 40U) & 0xFFU] ^ kTable[1][(word >> 48U) & 0xFFU] ^
-          kTable[0][(word >> 56U) & 0xFFU];
+          kTable[0][static_cast<std::uint8_t>(word >> 56U)];
   }
   for (const char byte : bytes)
     crc = (crc >> 8U) ^ kTable[0][(crc ^ static_cast<std::uint8_t>(byte)) & 0xFFU];
