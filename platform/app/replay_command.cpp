@@ -105,7 +105,7 @@ int replay(const ReplayOptions& options) {
     if (options.json)
       decisions.push_back(nlohmann::ordered_json::parse(log::decision_json(entry)));
     else
-      fmt::print("{}\n", text_of_decision(entry, entry.number, "the flight"));
+      fmt::print("{}\n", text_of_decision(entry, static_cast<std::size_t>(entry.number), "the flight"));
   };
   std::optional<report::ProgressLine> line(std::in_place);
   const mission::ReplayResult r = mission::replay_flight(

@@ -166,7 +166,7 @@ SuiteProblem hard_problem(const HardWorld& made, const std::string& vehicle, std
 SuiteProblem foreign_problem(const ForeignWorld& file, const std::string& folder, std::uint64_t seed) {
   std::vector<Ends> all(file.ends.begin(), file.ends.end());
   if (all.empty()) all = eth_ends(folder + "/" + kEthEnds, file.map);
-  const Ends& ends = all[(seed + all.size() - 1) % all.size()];
+  const Ends& ends = all[static_cast<std::size_t>((seed + all.size() - 1) % all.size())];
   sitl::WorldOptions options;
   options.start_W = point(ends.start_W);
   options.goal_W = point(ends.goal_W);

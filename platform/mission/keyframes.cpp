@@ -79,7 +79,7 @@ std::optional<Keyframe> Keyframes::before(std::uint64_t frames) const {
       *x = get.number<std::uint32_t>();
     const auto bytes = get.number<std::uint64_t>();
     if (bytes > kMostChanges_bytes) return {};
-    log::Decompressor().run(keyframe.changes, get.rest(), bytes);
+    log::Decompressor().run(keyframe.changes, get.rest(), static_cast<std::size_t>(bytes));
     return keyframe;
   } catch (const InputError&) {
     return {};

@@ -38,17 +38,18 @@ SpeedLimits speed_limits(const flight::FlightConfig& config) {
   const double shortest_s = seconds(g.policy.shortest), longest_s = seconds(g.policy.longest);
   const double visible_m = config.camera_range_m - planned_radius_m(v);
   SpeedLimits r;
-  r.always.push_back({"file", governor.v_max_mps(), "limits.speed_mps"});
-  r.always.push_back(
+  r.always = {
+      {"file", governor.v_max_mps(), "limits.speed_mps"},
       {"sight", governor.safe_speed_mps(visible_m, shortest_s),
        fmt::format("{:.0f} m of range, {}, decisions of {:.1f} s ({:.1f} m/s without)", config.camera_range_m,
-                   stop_text(v), shortest_s, governor.safe_speed_mps(visible_m, 0.0))});
-  r.always.push_back(
+                   stop_text(v), shortest_s, governor.safe_speed_mps(visible_m, 0.0))},
       {"drag", level_speed_mps(v),
-       fmt::format("[drag] against tilt_rad, {:.0f} degrees", v.tilt_rad * 180.0 / core::kPi)});
+       fmt::format("[drag] against tilt_rad, {:.0f} degrees", v.tilt_rad * 180.0 / core::kPi)},
+  };
   const double open_mps = r.lowest().speed_mps;
-  const auto add = [&](const char* name, double speed_mps, std::string why) {
-    r.where.push_back({name, std::min(speed_mps, open_mps), std::move(why)});
+  const auto add = [&](const char* name, double speed_mps, const std::string& why) {
+    const SpeedLimit limit{name, std::min(speed_mps, open_mps), why};
+    r.where.push_back(limit);
   };
   governor::Situation situation;
   situation.distance_to_goal_m = std::numeric_limits<double>::infinity();
