@@ -40,7 +40,7 @@ std::optional<Vector3> DecisionPipeline::viewpoint_W() noexcept {
     const stages::FinestView finest(fenced);
     core::Work& work = draft_.planner_work;
     const stages::PolledView view(finest, *draft_.planner_budget, work);
-    const auto to_W = viewpoints_.next(
+    auto to_W = viewpoints_.next(
         view, {*end_W, slow_radius_m(config_.vehicle), config_.level_view_ratio, config_.flight_bounds_W},
         work.units);
     if (to_W) {
