@@ -193,7 +193,7 @@ class DecisionPipeline {
   [[nodiscard]] std::optional<Vector3> known_end_W() const noexcept;
   /// What it looks at: that place, or from there on the goal.
   [[nodiscard]] Vector3 undecided_W(const DecisionInput& in) const noexcept;
-  /// From where it looks: whence most is seen of what is unknown around that place, or else from farther off.
+  /// From where it looks, and look_W_ there: whence most is seen of what is unknown around known_end_W(), or else from farther off.
   [[nodiscard]] std::optional<Vector3> viewpoint_W() noexcept;
   /// Where what was found meets a body that moves: slower, a stop, or to the side, whatever meets none, or the latest.
   void give_way(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
@@ -231,9 +231,9 @@ class DecisionPipeline {
   MonotonicTime dodges_at_ = MonotonicTime::min();  ///< The same of the last one that goes aside.
   Draft draft_;
   std::array<double, kPrecisionLevels> searched_s_{};  ///< By level of p1: what the planner took lately.
-  std::optional<Vector3> look_W_{};  ///< What it looks at while it stands without a way, or steps back.
+  std::optional<Vector3> look_W_{};  ///< What it looks at while it stands without a way, or goes to see more.
   MonotonicTime blocked_since_{};    ///< Standing without a way, and the looks so far led nowhere.
-  MonotonicTime back_until_{};       ///< It steps back to look: nothing else is planned.
+  MonotonicTime back_until_{};       ///< It goes to see more: nothing else is planned.
   Viewpoints viewpoints_;
   MonotonicTime thin_until_{};  ///< Something thin was seen less than kThinLasts before.
   bool is_narrow_{false};       ///< What is flown was planned so.

@@ -1,4 +1,4 @@
-// What a vehicle that does not see all around does where no way is found: it looks, and steps back to see more.
+// What a vehicle that does not see all around does where no way is found: it looks, and goes to where it sees more.
 #include <algorithm>
 #include <array>
 
