@@ -8,7 +8,8 @@ namespace roborun::sensor_port {
 
 std::string port_path(const std::string& name) {
   if (name.find('/') != std::string::npos) return name;
-  return std::string(kPortFolder) + "/" + kPortPrefix + name;
+  std::string path(kPortFolder);
+  return path.append("/").append(kPortPrefix).append(name);
 }
 
 bool is_written_to(const std::string& path) {

@@ -83,7 +83,7 @@ class PortPair final : public Pair {
   sensor_port::PortCan b_;
 };
 
-std::vector<std::string> implementations() {
+std::vector<std::string> buses() {
   std::vector<std::string> out{"fake", "port"};
   const char* names = std::getenv("ROBORUN_TEST_CAN");
   std::istringstream in(names == nullptr ? "" : names);
@@ -184,13 +184,11 @@ TEST_P(CanBusContract, NeitherAllocatesNorWaits) {
   EXPECT_EQ(scope.count(), 0U);
 }
 
-INSTANTIATE_TEST_SUITE_P(Implementations, CanBusContract, testing::ValuesIn(implementations()),
-                         [](const auto& made) {
-                           std::string name = made.param;
-                           for (char& c : name)
-                             c = std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(Implementations, CanBusContract, testing::ValuesIn(buses()), [](const auto& made) {
+  std::string name = made.param;
+  for (char& c : name) c = std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
+  return name;
+});
 
 }  // namespace
 }  // namespace roborun::firmware_if

@@ -29,7 +29,7 @@ namespace {
 constexpr const char* kFake = "fake";
 constexpr const char* kGpioSim = "gpio_sim";
 
-std::vector<std::string> implementations() {
+std::vector<std::string> gpio_inputs() {
   std::vector<std::string> out{kFake, kGpioSim};
   if (const char* line = std::getenv("ROBORUN_TEST_GPIO"); line != nullptr) out.emplace_back(line);
   return out;
@@ -93,7 +93,7 @@ TEST_P(GpioInputContract, DoesNotAllocate) {
   EXPECT_EQ(scope.count(), 0U);
 }
 
-INSTANTIATE_TEST_SUITE_P(Implementations, GpioInputContract, testing::ValuesIn(implementations()), label);
+INSTANTIATE_TEST_SUITE_P(Implementations, GpioInputContract, testing::ValuesIn(gpio_inputs()), label);
 
 /// Those whose wire the test moves.
 using MovedGpioInputContract = GpioInputContract;

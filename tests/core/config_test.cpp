@@ -7,12 +7,13 @@
 #include "core/memory/enum_array.hpp"
 #include "core/range.hpp"
 #include "tests/support/config_death.hpp"
+#include "tests/support/limits.hpp"
 #include "tests/support/names.hpp"
 
 namespace roborun::core {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using test::kNan;
 
 TEST(Range, HoldsTheEndsThatItSays) {
   EXPECT_TRUE(within(0.0, 0.0, 1.0));

@@ -3,16 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 
 #include "core/geometry/inverse.hpp"
 #include "core/random/counter_rng.hpp"
+#include "tests/support/limits.hpp"
 
 namespace roborun::core {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using test::kInfinity;
+using test::kNan;
 
 TEST(Math, SineAndCosineAgreeWithLibm) {
   CounterRng rng(1);

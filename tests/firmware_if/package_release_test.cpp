@@ -15,7 +15,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-struct Rig {
+struct HookRig {
   test::RecordingBus bus;
   TransmitGate gate{{}, bus};
   sitl::FakeGpioOutput line;
@@ -23,7 +23,7 @@ struct Rig {
   MonotonicTime now{seconds{10}};
   PackageRelease::Input in{.wanted = true, .estimated = true, .height_m = 1.0, .speed_mps = 0.1};
 
-  Rig() { gate.set_node_id(10); }
+  HookRig() { gate.set_node_id(10); }
   void run(Nanos duration) {
     for (const MonotonicTime end = now + duration; now < end; now += milliseconds{10})
       EXPECT_EQ(sut.step(now, in), Status::kOk);
@@ -42,7 +42,7 @@ struct Rig {
 };
 
 TEST(PackageRelease, HoldsAndSaysSoOnceASecond) {
-  Rig rig;
+  HookRig rig;
   rig.in.wanted = false;
   rig.run(seconds{5});
   EXPECT_EQ(rig.said(), std::vector<int>(5, 1));
@@ -50,7 +50,7 @@ TEST(PackageRelease, HoldsAndSaysSoOnceASecond) {
 }
 
 TEST(PackageRelease, LetsGoWhereAllConditionsHaveHeldForHalfASecond) {
-  Rig rig;
+  HookRig rig;
   rig.run(milliseconds{500});
   EXPECT_FALSE(rig.sut.open());
   rig.run(milliseconds{10});
@@ -70,7 +70,7 @@ TEST(PackageRelease, KeepsThePackageWhereOneConditionFails) {
       {true, false, true, 1.0, 0.51}, {true, false, true, kNan, 0.1}, {true, false, true, 1.0, kNan},
       {false, false, true, 1.0, 0.1}};
   for (const PackageRelease::Input& in : unsafe) {
-    Rig rig;
+    HookRig rig;
     rig.in = in;
     rig.run(seconds{3});
     EXPECT_EQ(rig.said(), std::vector<int>(3, 1));
@@ -79,7 +79,7 @@ TEST(PackageRelease, KeepsThePackageWhereOneConditionFails) {
 }
 
 TEST(PackageRelease, BeginsToCountAnewAfterAGap) {
-  Rig rig;
+  HookRig rig;
   for (int i = 0; i < 10; ++i) {
     rig.in.speed_mps = 0.1;
     rig.run(milliseconds{490});
@@ -90,7 +90,7 @@ TEST(PackageRelease, BeginsToCountAnewAfterAGap) {
 }
 
 TEST(PackageRelease, KeepsThePackageOfAKilledVehicle) {
-  Rig rig;
+  HookRig rig;
   rig.run(seconds{1});
   ASSERT_TRUE(rig.line.active());
   rig.in.killed = true;
@@ -106,7 +106,7 @@ TEST(PackageRelease, KeepsThePackageOfAKilledVehicle) {
 }
 
 TEST(PackageRelease, RepeatsWhatTheBusRefusedAndSaysThatTheLineIsGone) {
-  Rig rig;
+  HookRig rig;
   rig.bus.answer = Status::kNotReady;
   rig.run(seconds{1});
   EXPECT_GT(rig.sut.counters().refused, 0U);
@@ -118,7 +118,7 @@ TEST(PackageRelease, RepeatsWhatTheBusRefusedAndSaysThatTheLineIsGone) {
 }
 
 TEST(PackageRelease, TheLimitsThemselvesAreSafeAndADropIsCountedOnce) {
-  Rig rig;
+  HookRig rig;
   rig.in.height_m = 2.0;
   rig.in.speed_mps = 0.5;
   rig.run(seconds{3});
@@ -128,7 +128,7 @@ TEST(PackageRelease, TheLimitsThemselvesAreSafeAndADropIsCountedOnce) {
 }
 
 TEST(PackageRelease, SpeaksAtOnceAfterTheStartAndAgainAfterExactlyASecond) {
-  Rig rig;
+  HookRig rig;
   rig.in.wanted = false;
   std::vector<std::size_t> said;
   for (const milliseconds at : {milliseconds{0}, milliseconds{999}, milliseconds{1000}}) {
@@ -139,13 +139,13 @@ TEST(PackageRelease, SpeaksAtOnceAfterTheStartAndAgainAfterExactlyASecond) {
 }
 
 TEST(PackageRelease, NeedsNoLine) {
-  Rig rig;
+  HookRig rig;
   PackageRelease sut{{}, rig.gate, nullptr};
   EXPECT_EQ(sut.step(rig.now, rig.in), Status::kOk);
 }
 
 TEST(PackageRelease, DoesNotAllocate) {
-  Rig rig;
+  HookRig rig;
   rig.bus.sent.reserve(8);
   const test::NoAllocScope scope;
   EXPECT_EQ(rig.sut.step(rig.now, rig.in), Status::kOk);

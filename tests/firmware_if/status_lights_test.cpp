@@ -12,13 +12,13 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-struct Rig {
+struct LightsRig {
   test::RecordingBus bus;
   TransmitGate gate{{}, bus};
   StatusLights sut{3, gate};
   MonotonicTime now{seconds{10}};
 
-  Rig() { gate.set_node_id(10); }
+  LightsRig() { gate.set_node_id(10); }
   /// What the light shows after each command that left.
   std::vector<dronecan::Rgb565> run(Nanos duration, VehicleState state) {
     bus.sent.clear();
@@ -36,7 +36,7 @@ struct Rig {
 };
 
 TEST(StatusLights, AreGreenWhereNothingCanTurnAndRedWhereSomethingMay) {
-  Rig rig;
+  LightsRig rig;
   const auto safe = rig.run(seconds{2}, VehicleState::kSafe);
   ASSERT_EQ(safe.size(), 4U);
   for (const auto& colour : safe) EXPECT_TRUE(colour.green == 63 && colour.red == 0 && colour.blue == 0);
@@ -46,14 +46,14 @@ TEST(StatusLights, AreGreenWhereNothingCanTurnAndRedWhereSomethingMay) {
 }
 
 TEST(StatusLights, ShowAFailsafeInTwoColoursInTurn) {
-  Rig rig;
+  LightsRig rig;
   const auto colours = rig.run(seconds{2}, VehicleState::kFailsafe);
   ASSERT_EQ(colours.size(), 4U);
   for (std::size_t i = 1; i < colours.size(); ++i) EXPECT_NE(colours[i].red, colours[i - 1].red);
 }
 
 TEST(StatusLights, ShowAChangeAtOnce) {
-  Rig rig;
+  LightsRig rig;
   EXPECT_EQ(rig.run(milliseconds{100}, VehicleState::kSafe).size(), 1U);
   EXPECT_EQ(rig.run(milliseconds{10}, VehicleState::kArmed).size(), 1U);
   // Too soon for the gate: said as soon as it takes it.

@@ -7,11 +7,12 @@
 
 #include "core/random/counter_rng.hpp"
 #include "governor/budget/time_budget.hpp"
+#include "tests/support/limits.hpp"
 
 namespace roborun::governor {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using test::kNan;
 constexpr BudgetLimits kLimits{Nanos{1'000'000}, Nanos{15'000'000'000}};
 
 TEST(StoppingModel, RecomputesThePublishedFit) {

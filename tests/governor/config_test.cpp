@@ -1,14 +1,13 @@
 #include <gtest/gtest.h>
 
-#include <limits>
-
 #include "governor/policy/governor.hpp"
 #include "tests/support/config_death.hpp"
+#include "tests/support/limits.hpp"
 
 namespace roborun::governor {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using test::kNan;
 
 TEST(GovernorConfigDeathTest, OnlyValidOnesAreMade) {
   using Config = GovernorConfig;

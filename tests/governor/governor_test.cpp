@@ -3,19 +3,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <vector>
 
 #include "core/random/counter_rng.hpp"
+#include "tests/support/limits.hpp"
 #include "tests/support/names.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::governor {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using test::kInfinity;
+using test::kNan;
 
 KnobArray<LatencyModel> models_of(const core::CostProfile& costs) {
   return {from_cost(costs.of(core::StageId::kMap)), from_cost(costs.of(core::StageId::kExport)),

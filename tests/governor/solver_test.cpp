@@ -1,20 +1,20 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "core/random/counter_rng.hpp"
 #include "governor/solver/certificate.hpp"
 #include "governor/solver/lattice_solver.hpp"
+#include "tests/support/limits.hpp"
 #include "tests/support/names.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::governor {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
+using test::kNan;
 
 SolverProblem random_problem(core::CounterRng& rng) {
   SolverProblem p;

@@ -15,11 +15,12 @@
 #include "stages/planning/smoother.hpp"
 #include "tests/stages/perception/scene.hpp"
 #include "tests/support/box_view.hpp"
+#include "tests/support/limits.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
 constexpr std::uint64_t kNever = std::numeric_limits<std::uint64_t>::max();
 constexpr std::uint64_t kInterval = 1024;  // of the contract of StageBudget
 constexpr std::uint64_t kOneBox = 1024;    // lookups of one question to the map

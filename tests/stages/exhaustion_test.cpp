@@ -13,12 +13,13 @@
 #include "stages/planning/rrt_star.hpp"
 #include "tests/stages/perception/scene.hpp"
 #include "tests/support/box_view.hpp"
+#include "tests/support/limits.hpp"
 
 namespace roborun::stages {
 namespace {
 
 constexpr std::uint64_t kForEver = std::numeric_limits<std::uint64_t>::max();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
 
 /// Calls `run(fault)` for every allocation index, once and for ever, until a run finishes without a hit. run
 /// returns the number of allocations that it asked for. Returns how many runs were hit.

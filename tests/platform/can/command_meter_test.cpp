@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/executive/frame_table.hpp"
 #include "firmware_if/dronecan/transfer.hpp"
 #include "platform/sitl/bus/fake_can.hpp"
 
@@ -9,8 +10,6 @@ namespace roborun::sitl {
 namespace {
 
 namespace dc = firmware_if::dronecan;
-
-constexpr Nanos kFrame{2'500'000};
 
 class CommandMeterTest : public ::testing::Test {
  protected:
@@ -37,7 +36,7 @@ class CommandMeterTest : public ::testing::Test {
     }
   }
   FakeCan bus{1'000'000, 1};
-  can::CommandMeter sut{kFrame};
+  can::CommandMeter sut{core::kMinorFrame};
   can::MeteredBus node{bus.port(0), sut};
   can::MeteredBus esc{bus.port(1), sut};
   std::uint8_t id{0};
@@ -45,10 +44,10 @@ class CommandMeterTest : public ::testing::Test {
 
 TEST_F(CommandMeterTest, PairsWhatWasSentWithWhatWasHeard) {
   MonotonicTime now{};
-  for (int i = 0; i < 1000; ++i, now += kFrame) {
+  for (int i = 0; i < 1000; ++i, now += core::kMinorFrame) {
     command(now);
     say(dc::NodeStatus{}, now);
-    listen(now + kFrame);
+    listen(now + core::kMinorFrame);
   }
   EXPECT_EQ(sut.sent(), 1000U) << "and no NodeStatus";
   EXPECT_EQ(sut.heard(), 1000U);
@@ -58,27 +57,27 @@ TEST_F(CommandMeterTest, PairsWhatWasSentWithWhatWasHeard) {
   EXPECT_EQ(sut.age().min(), Nanos{131'000});
   EXPECT_EQ(sut.age().max(), Nanos{131'000});
   EXPECT_EQ(sut.gap().count(), 999U);
-  EXPECT_EQ(sut.gap().max(), kFrame);
+  EXPECT_EQ(sut.gap().max(), core::kMinorFrame);
 }
 
 TEST_F(CommandMeterTest, CountsWhatTheBusLostAndTheGapItLeft) {
   MonotonicTime now{};
-  for (int i = 0; i < 1000; ++i, now += kFrame) {
+  for (int i = 0; i < 1000; ++i, now += core::kMinorFrame) {
     bus.set_faults({.loss_ratio = i % 10 < 2 ? 1.0 : 0.0});
     command(now);
-    listen(now + kFrame);
+    listen(now + core::kMinorFrame);
   }
   EXPECT_EQ(sut.sent(), 1000U);
   EXPECT_EQ(sut.heard(), 800U);
   EXPECT_EQ(sut.lost(), 200U);
-  EXPECT_EQ(sut.gap().max(), 3 * kFrame);
+  EXPECT_EQ(sut.gap().max(), 3 * core::kMinorFrame);
 }
 
 TEST_F(CommandMeterTest, CallsLateWhatAnotherOneHasOvertaken) {
   command({});
-  bus.advance(MonotonicTime{kFrame});
-  command(MonotonicTime{kFrame} - Nanos{2 * kFrame});  // made long before it was sent
-  listen(MonotonicTime{2 * kFrame});
+  bus.advance(MonotonicTime{core::kMinorFrame});
+  command(MonotonicTime{core::kMinorFrame} - Nanos{2 * core::kMinorFrame});  // made long before it was sent
+  listen(MonotonicTime{2 * core::kMinorFrame});
   EXPECT_EQ(sut.heard(), 2U);
   EXPECT_EQ(sut.late(), 1U);
 }
@@ -86,7 +85,7 @@ TEST_F(CommandMeterTest, CallsLateWhatAnotherOneHasOvertaken) {
 TEST_F(CommandMeterTest, CountsARepetitionOnce) {
   bus.set_faults({.duplicate_ratio = 1.0});
   command({});
-  listen(MonotonicTime{kFrame});
+  listen(MonotonicTime{core::kMinorFrame});
   EXPECT_EQ(esc.counters().received, 2U);
   EXPECT_EQ(sut.heard(), 1U);
 }
@@ -94,9 +93,9 @@ TEST_F(CommandMeterTest, CountsARepetitionOnce) {
 TEST_F(CommandMeterTest, CountsAsLostWhatADeadBusSwallowed) {
   bus.set_faults({.loss_ratio = 1.0});
   MonotonicTime now{};
-  for (int i = 0; i < 100; ++i, now += kFrame) {
+  for (int i = 0; i < 100; ++i, now += core::kMinorFrame) {
     command(now);
-    listen(now + kFrame);
+    listen(now + core::kMinorFrame);
   }
   EXPECT_EQ(sut.heard(), 0U);
   EXPECT_EQ(sut.lost(), 68U) << "32 may still come";

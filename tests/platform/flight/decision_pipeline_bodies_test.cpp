@@ -17,7 +17,7 @@ constexpr double kPeriod_s = 0.2;
 constexpr double kBody_m = 0.5;     // half an edge of the box
 constexpr double kTouches_m = 1.1;  // from its middle to that of the vehicle
 
-MonotonicTime at_s(double time_s) { return MonotonicTime{from_seconds(time_s)}; }
+MonotonicTime clock_s(double time_s) { return MonotonicTime{from_seconds(time_s)}; }
 
 /// Takes no time.
 class Free final : public core::StageMeter {
@@ -100,17 +100,17 @@ class Bodies : public ::testing::Test {
     DecisionPipeline sut(config_, meter_, policy_, cloud, map_, planner_, smoother_);
     DecisionOutput out;
     for (double t_s = 0.0; t_s <= time_s + 1e-9; t_s += kPeriod_s) {
-      const TrajectoryPoint now = committed.at(at_s(t_s));
+      const TrajectoryPoint now = committed.at(clock_s(t_s));
       test::Scene scene;
       scene.solid.push_back({{-100, -100, -1}, {100, 100, 0}});  // the ground
       for (const Mover& body : bodies) scene.solid.push_back(Aabb::around(body.at_W(t_s), kBody_m));
       std::vector<stages::PosedDepthFrame> frames = scene.look(now.p_W);
       for (stages::PosedDepthFrame& frame : frames) {
-        frame.frame.stamp = at_s(t_s);
+        frame.frame.stamp = clock_s(t_s);
         frame.error.constant_m = frame.error.quadratic_per_m = 0.0;  // or the same twice is a frozen image
       }
       DecisionInput in;
-      in.now = at_s(t_s);
+      in.now = clock_s(t_s);
       in.frames = frames;
       in.committed = &committed;
       in.p_WB = now.p_W;
@@ -127,7 +127,7 @@ class Bodies : public ::testing::Test {
     for (double t_s = 0.0; t_s <= 4.0; t_s += 0.05) {
       const double time_s = seconds(flown.start_time.time_since_epoch()) + t_s;
       for (const Mover& body : bodies)
-        nearest_m = std::min(nearest_m, (flown.at(at_s(time_s)).p_W - body.at_W(time_s)).norm());
+        nearest_m = std::min(nearest_m, (flown.at(clock_s(time_s)).p_W - body.at_W(time_s)).norm());
     }
     return nearest_m;
   }
@@ -147,7 +147,7 @@ class Bodies : public ::testing::Test {
   stages::Smoother smoother_;
 };
 
-const Trajectory kHovers = Trajectory::hold({0, 0, 3}, at_s(0.0));
+const Trajectory kHovers = Trajectory::hold({0, 0, 3}, clock_s(0.0));
 
 /// Along x at this speed, for a minute.
 Trajectory along_x(double speed_mps) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/executive/frame_table.hpp"
 #include "platform/flight/example/lift.hpp"
 #include "platform/flight/failsafe_monitor.hpp"
 #include "platform/flight/landing_site.hpp"
@@ -21,7 +22,6 @@ namespace {
 
 using governor::bit;
 using governor::Condition;
-constexpr Nanos kFrame{2'500'000};
 
 TEST(FailsafeMonitor, EachConditionHoldsAboveItsLimitForItsTimeAndNotBefore) {
   for (const FailsafeThreshold& row : kFailsafeThresholds) {
@@ -35,14 +35,14 @@ TEST(FailsafeMonitor, EachConditionHoldsAboveItsLimitForItsTimeAndNotBefore) {
       const MonotonicTime begin = now;
       governor::ConditionSet set = 0;
       while (seconds(now - begin) < row.for_s + 0.1) {
-        now += kFrame;
+        now += core::kMinorFrame;
         set = sut.step(now, bad);
         if (seconds(now - begin) <= row.for_s) {
           ASSERT_EQ(set & bit(row.condition), 0) << governor::to_string(row.condition);
         }
       }
       EXPECT_EQ((set & bit(row.condition)) != 0, excess > 0.0) << governor::to_string(row.condition);
-      now += kFrame;
+      now += core::kMinorFrame;
       EXPECT_EQ(sut.step(now, fine), 0) << "gone with its cause";
     }
   }
@@ -53,7 +53,7 @@ TEST(FailsafeMonitor, OneGoodMomentStartsTheTimeAgain) {
   MonotonicTime now{};
   FailsafeMeasures m{};
   for (int i = 0; i < 4000; ++i) {
-    now += kFrame;
+    now += core::kMinorFrame;
     m.depth_age_s = i % 100 == 0 ? 0.0 : 9.0;  // a good one every 250 ms, the limit is 500 ms
     ASSERT_EQ(sut.step(now, m), 0);
   }
@@ -65,7 +65,7 @@ TEST(FailsafeMonitor, ABatteryThatSaysNothingIsLowAndNotCritical) {
   m.battery_used_ratio = std::numeric_limits<double>::quiet_NaN();
   governor::ConditionSet set = 0;
   MonotonicTime now{};
-  for (int i = 0; i < 2000; ++i) set = sut.step(now += kFrame, m);
+  for (int i = 0; i < 2000; ++i) set = sut.step(now += core::kMinorFrame, m);
   EXPECT_EQ(set, bit(Condition::kBatteryLow));
 }
 
@@ -193,8 +193,8 @@ struct LedFlight {
   LedFlight() { sut.set_cruise_height(6.0); }
   void run(double time_s) {
     for (int i = 0; i < static_cast<int>(400.0 * time_s); ++i) {
-      now += kFrame;
-      p_W += seconds(kFrame) * v_W;
+      now += core::kMinorFrame;
+      p_W += seconds(core::kMinorFrame) * v_W;
       autopilot.said.stamp = now;
       ++autopilot.said.sequence;
       autopilot.said.p_WB_m = {p_W.x(), p_W.y(), p_W.z()};
@@ -210,7 +210,7 @@ struct LedFlight {
     autopilot.told.in_air = in_air;
   }
   ScriptedAutopilot autopilot;
-  FlightControl sut{VehicleModel{}, seconds(kFrame)};
+  FlightControl sut{VehicleModel{}, seconds(core::kMinorFrame)};
   Vector3 p_W = Vector3::Zero(), v_W = Vector3::Zero();
   MonotonicTime now{};
 };
@@ -279,11 +279,13 @@ TEST(FlightControl, DisarmsAnAutopilotWhoseTakeOffIsWithdrawnOnTheGround) {
 TEST(FlightControl, BrakesOnTheCommittedPathAndHoversThere) {
   test::Flight flight(5);
   const Vector3 from_W = flight.lane().committed().end_W();
-  flight.lane().offer(test::straight(from_W, from_W + Vector3(60.0, 0.0, 0.0), 6.0, flight.now() + kFrame));
+  flight.lane().offer(
+      test::straight(from_W, from_W + Vector3(60.0, 0.0, 0.0), 6.0, flight.now() + core::kMinorFrame));
   while (flight.truth().v_WB.x() < 5.5) flight.step();
   const double begin_m = flight.truth().p_WB.x();
   flight.lane().brake();
-  flight.lane().offer(test::straight(from_W, from_W + Vector3(0.0, 60.0, 0.0), 6.0, flight.now() + kFrame));
+  flight.lane().offer(
+      test::straight(from_W, from_W + Vector3(0.0, 60.0, 0.0), 6.0, flight.now() + core::kMinorFrame));
   double aside_m = 0.0;
   const MonotonicTime end = flight.now() + from_seconds(6.0);
   while (flight.now() < end) {

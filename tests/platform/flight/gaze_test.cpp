@@ -9,7 +9,7 @@
 namespace roborun::flight {
 namespace {
 
-constexpr double kPeriod_s = 0.0025;
+constexpr double kFrame_s = 0.0025;
 
 /// Straight on at a constant velocity for so long.
 Trajectory straight(const Vector3& v_W, double duration_s, MonotonicTime start) {
@@ -25,10 +25,10 @@ class GazeTest : public ::testing::Test {
  protected:
   /// Runs for so long; every step is within the yaw rate. Returns the last yaw.
   double run(Gaze& sut, const Trajectory& flown, double for_s) {
-    for (double t = 0.0; t < for_s; t += kPeriod_s) {
-      now_ += from_seconds(kPeriod_s);
+    for (double t = 0.0; t < for_s; t += kFrame_s) {
+      now_ += from_seconds(kFrame_s);
       const double yaw = sut.step({now_, flown, number_, look_W_});
-      EXPECT_LE(std::fabs(core::wrap_angle(yaw - yaw_)), kPeriod_s * config_.yaw_rate_radps + 1e-12);
+      EXPECT_LE(std::fabs(core::wrap_angle(yaw - yaw_)), kFrame_s * config_.yaw_rate_radps + 1e-12);
       turned_ += core::wrap_angle(yaw - yaw_);
       yaw_ = yaw;
     }
@@ -42,14 +42,14 @@ class GazeTest : public ::testing::Test {
 };
 
 TEST_F(GazeTest, KeepsItsYawWhereEverythingIsSeen) {
-  Gaze sut({}, kPeriod_s);
+  Gaze sut({}, kFrame_s);
   sut.begin(0.5);
   EXPECT_TRUE(sut.ready());
   EXPECT_EQ(run(sut, straight({0, 3, 0}, 5.0, now_), 20.0), 0.5);
 }
 
 TEST_F(GazeTest, LooksRoundOnceAfterTheClimbAndIsReadyThen) {
-  Gaze sut(config_, kPeriod_s);
+  Gaze sut(config_, kFrame_s);
   sut.begin(0.5);
   const Trajectory climb = straight({0, 0, 1.5}, 3.0, now_);
   EXPECT_EQ(run(sut, climb, 2.9), 0.5) << "not while it climbs";
@@ -62,7 +62,7 @@ TEST_F(GazeTest, LooksRoundOnceAfterTheClimbAndIsReadyThen) {
 }
 
 TEST_F(GazeTest, LooksWhereItFliesAndRoundWhenItIsStuck) {
-  Gaze sut(config_, kPeriod_s);
+  Gaze sut(config_, kFrame_s);
   sut.begin(0.5);
   (void)run(sut, straight({0, 0, 1.5}, 0.1, now_), 9.0);
   ASSERT_TRUE(sut.ready());
@@ -79,7 +79,7 @@ TEST_F(GazeTest, LooksWhereItFliesAndRoundWhenItIsStuck) {
 }
 
 TEST_F(GazeTest, LooksAtWhatItHasToSeeAlsoWhileItStepsBack) {
-  Gaze sut(config_, kPeriod_s);
+  Gaze sut(config_, kFrame_s);
   sut.begin(0.5);
   (void)run(sut, straight({0, 0, 1.5}, 0.1, now_), 9.0);
   ASSERT_TRUE(sut.ready());

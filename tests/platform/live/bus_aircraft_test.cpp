@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "core/executive/frame_table.hpp"
 #include "platform/live/plant_bus.hpp"
 #include "platform/live/plant_ports.hpp"
 #include "platform/sitl/aircraft/simulated_actuators.hpp"
@@ -14,7 +15,6 @@
 namespace roborun::live {
 namespace {
 
-constexpr Nanos kFrame{2'500'000};
 const sensor_port::EarthPlace kOrigin{47.0, 8.0, 400.0};
 
 /// A vehicle without cameras on the ground: everything it has is on its bus, but its lines.
@@ -26,7 +26,7 @@ class Vehicle {
   }
   /// One minor frame.
   void step() {
-    now += kFrame;
+    now += core::kMinorFrame;
     far_side_.advance(now, 0.9, vehicle_);
     if (has_nodes) {
       nodes_.step(now, Nanos{0});
@@ -121,7 +121,7 @@ class BusAircraftTest : public ::testing::Test {
   BusAircraft sut{port_wire(sensor_port::VehiclePorts(name), Nanos{0}),
                   sensor_port::VehiclePorts(name),
                   rig,
-                  kFrame,
+                  core::kMinorFrame,
                   Nanos{0},
                   std::nullopt,
                   {}};
@@ -217,8 +217,8 @@ TEST_F(BusAircraftTest, WithoutABusNothingElseIsAskedFor) {
   look(10);
   EXPECT_EQ(lacks("bus"), name + "-bus-in: No such file or directory: start what writes it");
   EXPECT_EQ(needs.size(), 2U);
-  BusAircraft none(kernel_wire("nocan7", Nanos{0}), sensor_port::VehiclePorts(name), rig, kFrame, Nanos{0},
-                   std::nullopt, {});
+  BusAircraft none(kernel_wire("nocan7", Nanos{0}), sensor_port::VehiclePorts(name), rig, core::kMinorFrame,
+                   Nanos{0}, std::nullopt, {});
   EXPECT_NE(none.look(vehicle.now).back().lacks.find("nocan7: "), std::string::npos);
 }
 
@@ -231,7 +231,7 @@ TEST_F(BusAircraftTest, HandsOutWhatTheNodesMeasure) {
   EXPECT_NEAR(imu.specific_force_B_mps2[2], 9.81, 1e-3);
   // What is measured in a minor frame is on the bus in the next one.
   EXPECT_GE(vehicle.now - imu.stamp, Nanos{0});
-  EXPECT_LE(vehicle.now - imu.stamp, 2 * kFrame);
+  EXPECT_LE(vehicle.now - imu.stamp, 2 * core::kMinorFrame);
   int fixes = 0;
   for (int i = 0; i < 400; ++i) {
     vehicle.step();

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/geometry/math.hpp"
 #include "tests/firmware_if/recording_bus.hpp"
+#include "tests/support/limits.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::live {
@@ -16,7 +16,7 @@ namespace {
 namespace dc = firmware_if::dronecan;
 using std::chrono::milliseconds;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+using test::kNanF;
 
 /// The nodes of a bus: says what a test wants, at its time.
 class Nodes {
@@ -108,7 +108,7 @@ TEST_F(BusSensorsTest, TakesTheMeansOverTheIntervalInForwardLeftUp) {
 }
 
 TEST_F(BusSensorsTest, TakesTheLatestValuesOfANodeThatDoesNotIntegrate) {
-  for (const float interval_s : {0.0F, -1.0F, kNan, 1e-6F, 0.5F}) {
+  for (const float interval_s : {0.0F, -1.0F, kNanF, 1e-6F, 0.5F}) {
     dc::RawImu m = level();
     m.integration_interval = interval_s;
     m.accelerometer_integral = {7.0F, 7.0F, 7.0F};
@@ -118,7 +118,7 @@ TEST_F(BusSensorsTest, TakesTheLatestValuesOfANodeThatDoesNotIntegrate) {
   }
   dc::RawImu m = level();
   m.integration_interval = 0.0025F;
-  m.rate_gyro_integral = {kNan, 0.0F, 0.0F};
+  m.rate_gyro_integral = {kNanF, 0.0F, 0.0F};
   hear(m);
   ASSERT_EQ(sut.imu().read(imu), Status::kOk);
   EXPECT_NEAR(imu.specific_force_B_mps2[2], 9.81, 0.004);
@@ -126,7 +126,7 @@ TEST_F(BusSensorsTest, TakesTheLatestValuesOfANodeThatDoesNotIntegrate) {
 
 TEST_F(BusSensorsTest, RefusesAnImuThatIsNotFinite) {
   dc::RawImu m = level();
-  m.accelerometer_latest[1] = kNan;
+  m.accelerometer_latest[1] = kNanF;
   hear(m);
   EXPECT_EQ(sut.imu().read(imu), Status::kNotReady);
   EXPECT_EQ(lacks("imu"), "node 30: what it says of RawIMU is not finite");
@@ -192,9 +192,9 @@ TEST_F(BusSensorsTest, RefusesWhatIsNoFix) {
   refused([](dc::GnssFix2& m) { m.covariance.count = 0; }, "does not state its errors (covariance)");
   refused([](dc::GnssFix2& m) { m.covariance.count = 5; }, "does not state its errors (covariance)");
   refused([](dc::GnssFix2& m) { m.covariance.items[3] = 0.0F; }, "does not state its errors (covariance)");
-  refused([](dc::GnssFix2& m) { m.covariance.items[0] = kNan; }, "does not state its errors (covariance)");
+  refused([](dc::GnssFix2& m) { m.covariance.items[0] = kNanF; }, "does not state its errors (covariance)");
   refused([](dc::GnssFix2& m) { m.latitude_deg_1e8 = 9'100'000'000; }, "is no place on the earth");
-  refused([](dc::GnssFix2& m) { m.ned_velocity[2] = kNan; }, "is not finite");
+  refused([](dc::GnssFix2& m) { m.ned_velocity[2] = kNanF; }, "is not finite");
 }
 
 TEST_F(BusSensorsTest, AHeadingBelongsToTheFixBeforeIt) {
@@ -210,7 +210,7 @@ TEST_F(BusSensorsTest, AHeadingBelongsToTheFixBeforeIt) {
   ASSERT_TRUE(has_fix());
   EXPECT_TRUE(std::isnan(fix.heading_rad));
   for (const dc::GnssHeading& bad :
-       {dc::GnssHeading{false, true, 0.5F, 0.02F}, dc::GnssHeading{true, true, kNan, 0.02F},
+       {dc::GnssHeading{false, true, 0.5F, 0.02F}, dc::GnssHeading{true, true, kNanF, 0.02F},
         dc::GnssHeading{true, true, 100.0F, 0.02F}}) {
     hear(good_fix());
     hear(bad, 31);
@@ -268,7 +268,7 @@ TEST_F(BusSensorsTest, PressureCountsFromTheFirstOne) {
   hear(dc::StaticPressure{101205.0F, 1.0F});
   ASSERT_EQ(sut.barometer().read(pressure), Status::kOk);
   EXPECT_NEAR(pressure.altitude_m, 10.0, 0.05);
-  for (const float wrong : {0.0F, -1.0F, kNan, 2e5F}) {
+  for (const float wrong : {0.0F, -1.0F, kNanF, 2e5F}) {
     hear(dc::StaticPressure{wrong, 1.0F});
     EXPECT_EQ(sut.barometer().read(pressure), Status::kNotReady) << wrong;
   }

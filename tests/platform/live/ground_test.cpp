@@ -12,10 +12,9 @@ namespace roborun::live {
 namespace {
 
 namespace mav = firmware_if::mavlink;
-using mavlink::Link;
 using mavlink::LinkAddress;
 
-constexpr sensor_port::EarthPlace kOrigin{47.397742, 8.545594, 488.0};
+constexpr sensor_port::EarthPlace kLocalOrigin{47.397742, 8.545594, 488.0};
 
 class GroundTest : public ::testing::Test {
  protected:
@@ -45,23 +44,23 @@ class GroundTest : public ::testing::Test {
   }
 
   static LinkAddress ear() {
-    Link free({LinkAddress::Kind::kUdpIn, "127.0.0.1", 0});
+    mavlink::Link free({LinkAddress::Kind::kUdpIn, "127.0.0.1", 0});
     std::array<std::uint8_t, 16> bytes{};
     (void)free.read(MonotonicTime{}, bytes);
     return {LinkAddress::Kind::kUdpIn, "127.0.0.1", free.local_port()};
   }
 
   LinkAddress ear_ = ear();
-  PortAircraft far_{"nobody", SensorRig{}, Nanos{2'500'000}, Nanos{0}, kOrigin};
+  PortAircraft far_{"nobody", SensorRig{}, Nanos{2'500'000}, Nanos{0}, kLocalOrigin};
   Ground sut_{GroundConfig{ear_, kGroundStation}, std::nullopt, far_};
-  Link station_{{LinkAddress::Kind::kUdpOut, "127.0.0.1", ear_.number}};
+  mavlink::Link station_{{LinkAddress::Kind::kUdpOut, "127.0.0.1", ear_.number}};
   MonotonicTime now_{Nanos{1'000'000'000}};
   std::uint8_t seq_{0};
 };
 
 TEST_F(GroundTest, MeasuresHeightsOverTheTakeOffFromWhereItStood) {
   constexpr std::uint8_t kOverHome = 6, kOverSea = 5;
-  sut_.begins_at(kOrigin);
+  sut_.begins_at(kLocalOrigin);
   (void)sut_.step(now_);  // listens
   auto goal_W = asked(kOverHome, 20.0F);
   ASSERT_TRUE(goal_W.has_value());

@@ -8,11 +8,11 @@ namespace roborun::live {
 namespace {
 
 const std::string kMission = std::string(ROBORUN_TEST_DATA) + "/missions/two_pillars.plan";
-constexpr sensor_port::EarthPlace kOrigin{47.397742, 8.545594, 488.0};
+constexpr sensor_port::EarthPlace kDrawnAt{47.397742, 8.545594, 488.0};
 const Aabb kBounds_W{Vector3(-10.0, -15.0, 1.5), Vector3(70.0, 15.0, 8.0)};
 
 TEST(MissionRouteTest, LiesWhereThePlanWasDrawn) {
-  const Route sut = route_of(mavlink::load_mission(kMission), kOrigin);
+  const Route sut = route_of(mavlink::load_mission(kMission), kDrawnAt);
   ASSERT_EQ(sut.steps.size(), 6U);  // without the take-off
   EXPECT_DOUBLE_EQ(sut.cruise_m, 4.0);
   EXPECT_LT((sut.first_W() - Vector3(30.0, 9.0, 4.0)).norm(), 0.05);
@@ -34,20 +34,20 @@ TEST(MissionRouteTest, NamesTheItemThatHasNoRoom) {
     }
     return {};
   };
-  const Route route = route_of(mavlink::load_mission(kMission), kOrigin);
+  const Route route = route_of(mavlink::load_mission(kMission), kDrawnAt);
   EXPECT_EQ(refusal(route, {kBounds_W.min_W, Vector3(50.0, 15.0, 8.0)}, 1.0).rfind("item 4: (60.00, ", 0),
             0U);
   EXPECT_EQ(refusal(route, kBounds_W, 6.0).rfind("item 2: (30.00, 9.00, 4.00): must be inside the fence", 0),
             0U);
   mavlink::MissionFile early = mavlink::load_mission(kMission);
   std::swap(early.items[1], early.items[5]);
-  EXPECT_THROW((void)route_of(early, kOrigin), InputError) << "a delay before the first way-point";
+  EXPECT_THROW((void)route_of(early, kDrawnAt), InputError) << "a delay before the first way-point";
   mavlink::MissionFile far = mavlink::load_mission(kMission);
   EXPECT_THROW((void)route_of(far, {10.0, 8.0, 488.0}), InputError) << "on another continent";
 }
 
 TEST(RouteFlightTest, DoesOneAfterTheOther) {
-  const Route route = route_of(mavlink::load_mission(kMission), kOrigin);
+  const Route route = route_of(mavlink::load_mission(kMission), kDrawnAt);
   RouteFlight sut(route);
   const Vector3 home_W(1.0, 2.0, 4.0);
   EXPECT_LT((*sut.step(0.0, home_W, true).goal_W - route.first_W()).norm(), 1e-9);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/executive/frame_table.hpp"
 #include "firmware_if/dronecan/transfer.hpp"
 #include "platform/live/plant_ports.hpp"
 #include "platform/sitl/aircraft/simulated_actuators.hpp"
@@ -12,8 +13,6 @@
 
 namespace roborun::live {
 namespace {
-
-constexpr Nanos kFrame{2'500'000};
 
 /// What writes the ports of a vehicle with one camera, one frame after the other; no world.
 class Feeder {
@@ -31,7 +30,7 @@ class Feeder {
   }
   /// One minor frame.
   void step() {
-    now += kFrame;
+    now += core::kMinorFrame;
     ++count_;
     far_side_.advance(now, charge_ratio, vehicle_);
     firmware_if::CanFrame heard;
@@ -100,7 +99,7 @@ class PortAircraftTest : public ::testing::Test {
   std::string name = test::scratch("aircraft");
   SensorRig rig = one_camera();
   Feeder feeder{name, rig};
-  PortAircraft sut{name, rig, kFrame, Nanos{0}, std::nullopt};
+  PortAircraft sut{name, rig, core::kMinorFrame, Nanos{0}, std::nullopt};
   std::vector<Need> needs;
 };
 

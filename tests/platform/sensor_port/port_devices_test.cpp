@@ -6,14 +6,15 @@
 #include <functional>
 #include <limits>
 
+#include "tests/support/limits.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace roborun::sensor_port {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+using test::kNanF;
+constexpr float kInfinityF = std::numeric_limits<float>::infinity();
 
 roborun_port_depth image(std::uint32_t width, std::uint32_t height) {
   roborun_port_depth d{};
@@ -62,8 +63,8 @@ TEST_F(PortDepthCameraTest, HandsOutMetresAndWhatIsNotKnown) {
   start(ROBORUN_PORT_DEPTH, 16 * 8 * 4);
   std::vector<float> depth_m(16 * 8, 3.0F);
   depth_m[0] = 0.0F;
-  depth_m[1] = kNan;
-  depth_m[2] = kInfinity;
+  depth_m[1] = kNanF;
+  depth_m[2] = kInfinityF;
   depth_m[3] = -1.0F;
   roborun_port_depth d = image(16, 8);
   d.fx = 8.0F;
@@ -86,7 +87,7 @@ TEST_F(PortDepthCameraTest, HandsOutMetresAndWhatIsNotKnown) {
   EXPECT_EQ(frame.range_min_m, 0.2F);
   EXPECT_TRUE(std::isnan(frame.depth_m[0]));
   EXPECT_TRUE(std::isnan(frame.depth_m[1]));
-  EXPECT_EQ(frame.depth_m[2], kInfinity);
+  EXPECT_EQ(frame.depth_m[2], kInfinityF);
   EXPECT_TRUE(std::isnan(frame.depth_m[3]));
   EXPECT_EQ(frame.depth_m[4], 3.0F);
   EXPECT_EQ(sut_.mount().p_BC_m[0], 0.25);
@@ -170,11 +171,11 @@ TEST_F(PortDepthCameraTest, RefusesWhatIsNoImage) {
   EXPECT_FALSE(reads([](D&) {}, 32 * 16 * 4 - 4));
   EXPECT_TRUE(refused(1, 0));
   for (const auto& spoil : std::vector<std::function<void(D&)>>{
-           [](D& d) { d.fx = kNan; }, [](D& d) { d.fy = 0.0F; }, [](D& d) { d.cx = kNan; },
-           [](D& d) { d.cx = 32.0F; }, [](D& d) { d.cy = 15.0F; }, [](D& d) { d.range_m = kInfinity; },
-           [](D& d) { d.range_m = 0.1F; }, [](D& d) { d.range_min_m = kNan; },
-           [](D& d) { d.mount.q_BS[0] = 2.0F; }, [](D& d) { d.mount.q_BS[1] = kNan; },
-           [](D& d) { d.mount.p_BS_m[2] = kInfinity; }, [](D& d) { d.mount.p_BS_m[2] = 1.0F; }}) {
+           [](D& d) { d.fx = kNanF; }, [](D& d) { d.fy = 0.0F; }, [](D& d) { d.cx = kNanF; },
+           [](D& d) { d.cx = 32.0F; }, [](D& d) { d.cy = 15.0F; }, [](D& d) { d.range_m = kInfinityF; },
+           [](D& d) { d.range_m = 0.1F; }, [](D& d) { d.range_min_m = kNanF; },
+           [](D& d) { d.mount.q_BS[0] = 2.0F; }, [](D& d) { d.mount.q_BS[1] = kNanF; },
+           [](D& d) { d.mount.p_BS_m[2] = kInfinityF; }, [](D& d) { d.mount.p_BS_m[2] = 1.0F; }}) {
     EXPECT_FALSE(reads(spoil));
     EXPECT_TRUE(refused(0, 1));
   }
@@ -203,7 +204,7 @@ TEST_F(PortDepthCameraTest, AClockThatGoesBackCostsOneImage) {
 TEST_F(PortLidarTest, HandsOutPointsAndRefusesCountsThatAreNotTheirs) {
   start(ROBORUN_PORT_CLOUD, 10 * sizeof(roborun_port_point));
   std::vector<roborun_port_point> points(10, {1.0F, 2.0F, 3.0F, 0.01F});
-  points[3].x_m = kNan;
+  points[3].x_m = kNanF;
   roborun_port_cloud c{};
   c.points = 10;
   c.range_min_m = 0.5F;

@@ -6,13 +6,14 @@
 #include <limits>
 
 #include "platform/sensor_port/port_bus.hpp"
+#include "tests/support/limits.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace roborun::sensor_port {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using test::kNan;
 constexpr EarthPlace kZurich{47.3977, 8.5456, 488.0};
 constexpr MonotonicTime kStart{Nanos{5'000'000'000}};
 

@@ -5,16 +5,17 @@
 #include <cmath>
 #include <limits>
 
+#include "core/executive/frame_table.hpp"
 #include "core/geometry/math.hpp"
 #include "core/geometry/yaw.hpp"
 #include "core/random/counter_rng.hpp"
+#include "tests/support/limits.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr Nanos kImuPeriod{2'500'000};
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using test::kNan;
 
 /// A body on a horizontal circle, always level, with exact sensors plus the noise that is asked for.
 class Circle {
@@ -75,9 +76,9 @@ void run(Estimator& estimator, Circle& circle, double begin_s, double end_s, int
   const auto first = static_cast<int>(begin_s * 400.0);
   const auto last = static_cast<int>(end_s * 400.0);
   for (int k = first + 1; k <= last; ++k) {
-    ASSERT_EQ(estimator.predict(circle.imu(MonotonicTime{} + k * kImuPeriod)), Status::kOk);
+    ASSERT_EQ(estimator.predict(circle.imu(MonotonicTime{} + k * core::kMinorFrame)), Status::kOk);
     if ((k - late_frames) % 40 == 0 && k > late_frames)
-      (void)estimator.update(circle.gnss(MonotonicTime{} + (k - late_frames) * kImuPeriod));
+      (void)estimator.update(circle.gnss(MonotonicTime{} + (k - late_frames) * core::kMinorFrame));
   }
 }
 
@@ -249,10 +250,10 @@ TEST(Estimator, TheBarometerHoldsTheHeightWithoutGnss) {
   circle.accel_bias_B = Vector3(0.0, 0.0, 0.03);
   run(estimator, circle, 0.0, 10.0);
   for (int k = 4001; k <= 4000 + 30 * 400; ++k) {
-    ASSERT_EQ(estimator.predict(circle.imu(MonotonicTime{} + k * kImuPeriod)), Status::kOk);
+    ASSERT_EQ(estimator.predict(circle.imu(MonotonicTime{} + k * core::kMinorFrame)), Status::kOk);
     if (k % 8 != 0) continue;
     firmware_if::BarometerSample pressure;
-    pressure.stamp = MonotonicTime{} + k * kImuPeriod;
+    pressure.stamp = MonotonicTime{} + k * core::kMinorFrame;
     pressure.altitude_m = 5.0;
     (void)estimator.update(pressure);
   }
@@ -267,8 +268,8 @@ TEST(Estimator, AllocatesNothing) {
   run(estimator, circle, 0.0, 1.0);
   const test::NoAllocScope scope;
   for (int k = 401; k < 800; ++k) {
-    (void)estimator.predict(circle.imu(MonotonicTime{} + k * kImuPeriod));
-    if (k % 40 == 0) (void)estimator.update(circle.gnss(MonotonicTime{} + k * kImuPeriod));
+    (void)estimator.predict(circle.imu(MonotonicTime{} + k * core::kMinorFrame));
+    if (k % 40 == 0) (void)estimator.update(circle.gnss(MonotonicTime{} + k * core::kMinorFrame));
   }
   EXPECT_EQ(scope.count(), 0U);
 }

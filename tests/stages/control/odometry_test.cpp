@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 
+#include "core/executive/frame_table.hpp"
 #include "core/geometry/math.hpp"
 #include "core/random/counter_rng.hpp"
 #include "stages/control/estimator.hpp"
@@ -13,7 +14,6 @@
 namespace roborun::stages {
 namespace {
 
-constexpr Nanos kImuPeriod{2'500'000};
 constexpr double kSpeed_mps = 3.0;
 
 double seconds_of(MonotonicTime t) { return seconds(t.time_since_epoch()); }
@@ -73,7 +73,7 @@ class Flight {
   /// `each` sees the state after every step; samples of odometry are 40 ms late, fixes 100 ms.
   void fly(double until_s, const std::function<void(double, const EstimatedState&)>& each = {}) {
     for (; seconds_of(now_) < until_s; ++step_) {
-      now_ += kImuPeriod;
+      now_ += core::kMinorFrame;
       const double t = seconds_of(now_);
       firmware_if::ImuSample imu;
       imu.stamp = now_;

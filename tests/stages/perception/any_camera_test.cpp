@@ -10,13 +10,14 @@
 #include "stages/perception/brick_map.hpp"
 #include "stages/perception/point_cloud.hpp"
 #include "tests/stages/perception/scene.hpp"
+#include "tests/support/limits.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+using test::kInfinity;
+using test::kNanF;
 
 /// A D455's: 640 x 480, 87 x 58 degrees, 0.3 to 10 m.
 CameraSpec front() {
@@ -180,7 +181,7 @@ TEST_F(AnyCamera, WhatIsTooNearSaysNothing) {
   };
   const std::uint64_t near = digest();
   for (std::size_t i = 0; i < image.size(); ++i)
-    if (i % 640 < 200) image[i] = kNan;
+    if (i % 640 < 200) image[i] = kNanF;
   EXPECT_EQ(digest(), near);
   for (std::size_t i = 0; i < image.size(); ++i)
     if (i % 640 < 200) image[i] = 0.31F;
@@ -235,11 +236,11 @@ TEST(WidePyramid, BoundsEveryRectangleOfTheLargestImage) {
   for (float& d : depth) d = static_cast<float>(rng.uniform(0.5, 30.0));
   for (int i = 0; i < 500; ++i) {
     const auto at = static_cast<std::size_t>(rng.below(depth.size()));
-    depth[at] = i % 2 == 0 ? kNan : 0.2F;
-    if (at + 1281 < depth.size() && i % 5 == 0) depth[at + 1] = depth[at + 1280] = kNan;
+    depth[at] = i % 2 == 0 ? kNanF : 0.2F;
+    if (at + 1281 < depth.size() && i % 5 == 0) depth[at + 1] = depth[at + 1280] = kNanF;
   }
   for (std::size_t v = 100; v < 140; ++v)  // a hole
-    std::fill_n(depth.begin() + static_cast<std::ptrdiff_t>(1280 * v + 300), 57, kNan);
+    std::fill_n(depth.begin() + static_cast<std::ptrdiff_t>(1280 * v + 300), 57, kNanF);
   {}
   firmware_if::DepthFrame frame;
   frame.width = 1280;
@@ -310,11 +311,11 @@ TEST(FrameShape, RefusesOpticsThatCannotBe) {
   };
   EXPECT_EQ(status([](auto&) {}), Status::kOk);
   EXPECT_EQ(status([](auto& f) { f.tan_half_height = 0.5F; }), Status::kOk);
-  for (const float bad : {0.0F, -1.0F, 2.5F, kNan}) {
+  for (const float bad : {0.0F, -1.0F, 2.5F, kNanF}) {
     EXPECT_EQ(status([bad](auto& f) { f.tan_half_width = bad; }), Status::kInvalidArgument);
     EXPECT_EQ(status([bad](auto& f) { f.tan_half_height = bad; }), Status::kInvalidArgument);
   }
-  for (const float bad : {-0.1F, 20.0F, 30.0F, kNan})
+  for (const float bad : {-0.1F, 20.0F, 30.0F, kNanF})
     EXPECT_EQ(status([bad](auto& f) { f.range_min_m = bad; }), Status::kInvalidArgument);
 }
 

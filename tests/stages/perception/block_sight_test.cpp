@@ -11,11 +11,12 @@
 #include "stages/perception/brick_map.hpp"
 #include "stages/perception/instruction_sets.hpp"
 #include "tests/stages/perception/scene.hpp"
+#include "tests/support/limits.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
 
 Matrix3 tilted() {
   return (Eigen::AngleAxisd(0.3, Vector3::UnitZ()) * Eigen::AngleAxisd(0.1, Vector3::UnitY()) *

@@ -6,12 +6,13 @@
 #include "stages/perception/point_cloud.hpp"
 #include "stages/perception/space_profiler.hpp"
 #include "tests/stages/perception/scene.hpp"
+#include "tests/support/limits.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
 
 /// All that a cell can hold.
 constexpr std::array<unsigned, 14> kStates{0, 1, 2, 3, 5, 7, 8, 9, 10, 11, 12, 13, 14, 15};

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <vector>
 
 #include "stages/perception/brick_map.hpp"
@@ -10,11 +9,12 @@
 #include "stages/perception/space_profiler.hpp"
 #include "tests/support/box_view.hpp"
 #include "tests/support/config_death.hpp"
+#include "tests/support/limits.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using test::kNan;
 
 /// Makes a stage in an arena that is large enough for a valid one.
 template <typename Stage>

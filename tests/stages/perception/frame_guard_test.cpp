@@ -11,12 +11,13 @@
 #include "stages/perception/brick_map.hpp"
 #include "stages/perception/cloud_images.hpp"
 #include "tests/stages/perception/scene.hpp"
+#include "tests/support/limits.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+using test::kNanF;
 constexpr float kNothing = std::numeric_limits<float>::infinity();
 
 MonotonicTime at_s(double time_s) { return MonotonicTime{} + from_seconds(time_s); }
@@ -82,11 +83,11 @@ TEST_F(FrameGuardTest, SkyWithoutValuesIsOrdinary) {
   Shot shot(scene_, 1.0);
   for (std::size_t i = 0; i < 4; ++i)
     std::fill(shot.image[i].begin(),
-              shot.image[i].begin() + static_cast<std::ptrdiff_t>(shot.image[i].size() / 2), kNan);
-  shot.image[4].assign(shot.image[4].size(), kNan);
+              shot.image[i].begin() + static_cast<std::ptrdiff_t>(shot.image[i].size() / 2), kNanF);
+  shot.image[4].assign(shot.image[4].size(), kNanF);
   ASSERT_GT(shot.frames[4].X_WC.R_RT(2, 0), 0.9) << "looks up";
   EXPECT_EQ(refused(shot.frames), 0);
-  shot.image[5].assign(shot.image[5].size(), kNan);
+  shot.image[5].assign(shot.image[5].size(), kNanF);
   EXPECT_EQ(refused(shot.frames), 1) << "where the ground should be";
 }
 
@@ -254,7 +255,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         Fault{"Black", [](Shot& s, std::size_t i) { s.image[i].assign(s.image[i].size(), 0.0F); }},
         Fault{"White", [](Shot& s, std::size_t i) { s.image[i].assign(s.image[i].size(), kNothing); }},
-        Fault{"Nan", [](Shot& s, std::size_t i) { s.image[i].assign(s.image[i].size(), kNan); }},
+        Fault{"Nan", [](Shot& s, std::size_t i) { s.image[i].assign(s.image[i].size(), kNanF); }},
         Fault{"Half",
               [](Shot& s, std::size_t i) {
                 std::fill(s.image[i].begin() + static_cast<std::ptrdiff_t>(s.image[i].size() / 2),

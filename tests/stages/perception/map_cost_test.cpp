@@ -1,17 +1,17 @@
 // What the map does not do because it would tell nothing more.
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <memory>
 #include <vector>
 
 #include "stages/perception/brick_map.hpp"
 #include "tests/stages/perception/scene.hpp"
+#include "tests/support/limits.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
 
 /// A hall of 60 m with pillars.
 class MapCost : public ::testing::Test {

@@ -8,12 +8,13 @@
 #include "stages/perception/brick_map.hpp"
 #include "stages/perception/pixel_kinds.hpp"
 #include "tests/stages/perception/scene.hpp"
+#include "tests/support/limits.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+using test::kInfinity;
+using test::kNanF;
 constexpr int kPixels = 64;
 
 class NoisyImages : public ::testing::Test {
@@ -86,7 +87,7 @@ TEST_F(NoisyImages, LostPixelsHereAndThereCostLittle) {
     for (int n = 0; n < 2; ++n)
       see([&](auto& image) {
         for (float& d : image)
-          if (rng.uniform() < lost_ratio) d = kNan;
+          if (rng.uniform() < lost_ratio) d = kNanF;
       });
     EXPECT_GT(count(around, CellState::kFree), 95 * whole / 100) << lost_ratio;
   }
@@ -97,7 +98,7 @@ TEST_F(NoisyImages, BehindAHoleNothingIsKnown) {
   const auto lose = [this](auto& image) {
     if (&image != &scene_.image[0]) return;
     for (std::size_t v = 22; v < 42; ++v)
-      for (std::size_t u = 22; u < 42; ++u) image[v * kPixels + u] = kNan;
+      for (std::size_t u = 22; u < 42; ++u) image[v * kPixels + u] = kNanF;
   };
   for (int n = 0; n < 10; ++n) see(lose);
   const Aabb hole{Vector3(4.05, -0.75, 4.35), Vector3(7.35, 0.75, 5.55)};
@@ -116,7 +117,7 @@ TEST_F(NoisyImages, HolesDoNotClearWhatWasSeen) {
   for (int n = 0; n < 30; ++n)
     see([this](auto& image) {
       if (&image != &scene_.image[0]) return;
-      for (std::size_t i = 0; i < image.size() / 2; ++i) image[i] = kNan;
+      for (std::size_t i = 0; i < image.size() / 2; ++i) image[i] = kNanF;
     });
   EXPECT_EQ(count(front, CellState::kOccupied), before);
 }
@@ -133,7 +134,7 @@ TEST_F(NoisyImages, WhatALookDoesNotDivideMayHideAsMuchAsACellOf30cm) {
             if (&image != scene_.image.data()) return;
             for (std::size_t v = 32 - side / 2; v < 32 - side / 2 + side; ++v)
               for (std::size_t u = 32 - side / 2; u < 32 - side / 2 + side; ++u)
-                image[v * kPixels + u] = kNan;
+                image[v * kPixels + u] = kNanF;
           },
           {0.0, 0.0}, level);
     return count(block, CellState::kFree) == 8;  // its corners, 0.3 m apart
@@ -148,7 +149,7 @@ TEST_F(NoisyImages, WhatALookDoesNotDivideMayHideAsMuchAsACellOf30cm) {
 constexpr DepthError kDarkSky{0.0, 0.0, 0.0, 0.0, false, true};
 void lose_sky(std::vector<float>& image) {
   for (float& d : image)
-    if (std::isinf(d)) d = kNan;
+    if (std::isinf(d)) d = kNanF;
 }
 
 TEST_F(NoisyImages, SkyWithoutValuesIsFreeWhereTheGroundIsSeenBelowIt) {
@@ -174,7 +175,7 @@ TEST_F(NoisyImages, AWallWithoutTextureStandsWhereItsFootIs) {
           if (&image != scene_.image.data()) return;
           for (std::size_t v = 0; v < kPixels; ++v)
             for (std::size_t u = 0; u < kPixels; ++u)
-              if (float& d = image[v * kPixels + u]; d > 7.89F && d < 7.91F) d = kNan;
+              if (float& d = image[v * kPixels + u]; d > 7.89F && d < 7.91F) d = kNanF;
         },
         kDarkSky);
   EXPECT_EQ(count({Vector3(8.1, -1.65, 0.45), Vector3(11.9, 1.65, 11.0)}, CellState::kFree), 0);
@@ -195,7 +196,8 @@ TEST_F(NoisyImages, ACeilingWithoutTextureIsNoSky) {
           for (std::size_t v = 0; v < kPixels; ++v)
             for (std::size_t u = 0; u < kPixels; ++u) {
               const double up = 1.0 - (static_cast<double>(v) + 0.5) * 2.0 / kPixels;
-              if (float& d = image[v * kPixels + u]; up > 0.0 && up * static_cast<double>(d) > 2.99) d = kNan;
+              if (float& d = image[v * kPixels + u]; up > 0.0 && up * static_cast<double>(d) > 2.99)
+                d = kNanF;
             }
         },
         kDarkSky);
@@ -209,7 +211,7 @@ TEST_F(NoisyImages, APatchWithoutTextureIsAsFarAsWhatIsAroundIt) {
         [this](auto& image) {
           if (&image != scene_.image.data()) return;
           for (std::size_t v = 26; v < 38; ++v)
-            for (std::size_t u = 26; u < 38; ++u) image[v * kPixels + u] = kNan;
+            for (std::size_t u = 26; u < 38; ++u) image[v * kPixels + u] = kNanF;
         },
         kDarkSky);
   EXPECT_GT(count({Vector3(4.05, -0.45, 4.65), Vector3(6.45, 0.45, 5.25)}, CellState::kFree), 70);
@@ -339,7 +341,7 @@ TEST(PixelKinds, KnowsMixedAndThinOnes) {
   }
   at(16, 4) = 7.0F;  // between it and what is behind
   at(8, 6) = 4.0F;   // a small thing alone
-  at(3, 2) = kNan;
+  at(3, 2) = kNanF;
   at(19, 7) = at(19, 8) = 8.0F;  // a pole that ends below what is nearer
   for (std::size_t u = 18; u < 21; ++u) at(u, 5) = at(u, 6) = 6.0F;
   firmware_if::DepthFrame frame;

@@ -7,11 +7,12 @@
 #include "stages/perception/brick_map.hpp"
 #include "stages/perception/octomap_backend/octomap_backend.hpp"
 #include "tests/stages/perception/scene.hpp"
+#include "tests/support/limits.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
 
 /// The same promises for both backends.
 class OccupancyMapContract : public ::testing::TestWithParam<const char*> {

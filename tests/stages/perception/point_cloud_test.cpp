@@ -11,11 +11,12 @@
 #include "stages/perception/space_profiler.hpp"
 #include "tests/stages/perception/scene.hpp"
 #include "tests/support/box_view.hpp"
+#include "tests/support/limits.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
 
 struct Fixture {
   static constexpr PointCloud::Config kLarge{.max_points = 262144};

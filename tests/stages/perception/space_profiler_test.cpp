@@ -3,16 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "core/geometry/math.hpp"
 #include "tests/support/box_view.hpp"
+#include "tests/support/limits.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
 constexpr double kRadius_m = 0.6;
 
 /// Free is only what lies behind a plane 3 m ahead of the vehicle, which is at the origin at 5 m height.

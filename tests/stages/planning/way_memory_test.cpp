@@ -9,12 +9,13 @@
 #include <vector>
 
 #include "tests/support/box_view.hpp"
+#include "tests/support/limits.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::stages {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
 
 class WayMemoryTest : public ::testing::Test {
  protected:

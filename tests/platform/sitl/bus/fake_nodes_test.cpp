@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 
+#include "core/executive/frame_table.hpp"
 #include "firmware_if/dronecan/node.hpp"
 #include "firmware_if/package_release.hpp"
 #include "firmware_if/status_lights.hpp"
@@ -21,8 +22,6 @@ namespace dc = firmware_if::dronecan;
 using firmware_if::VehicleState;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-
-constexpr Nanos kFrame{2'500'000};
 
 struct Rig {
   FakeCan bus{1'000'000, 7};
@@ -49,7 +48,7 @@ struct Rig {
       (void)node.step(now, {.cycle_ok = true});
       (void)release.step(now, in);
       lights.step(now, state);
-      now += kFrame;
+      now += core::kMinorFrame;
       bus.advance(now);
       power_module.step(charge_ratio, now);
       hook.step(now);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "core/executive/frame_table.hpp"
 #include "core/random/counter_rng.hpp"
 #include "firmware_if/dronecan/node.hpp"
 #include "firmware_if/kill_switch.hpp"
@@ -19,8 +20,6 @@ namespace dc = firmware_if::dronecan;
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-
-constexpr Nanos kFrame{2'500'000};
 
 struct Chain {
   FakeCan bus{1'000'000, 5};
@@ -46,7 +45,7 @@ struct Chain {
       gate.beat(now);
       (void)node.step(now, {.cycle_ok = true, .armed = true, .thrust_ratio = thrust});
     }
-    now += kFrame;
+    now += core::kMinorFrame;
     bus.advance(now);
     throttle = esc.step(now);
   }
@@ -72,8 +71,9 @@ TEST(KillChain, StopsTheEscWithinTwoFramesInAThousandRandomPhases) {
     chain.take_off();
     chain.frames(static_cast<int>(rng.below(8)));
     // The edge comes somewhere between two samples: after this frame's, before the next one's.
-    const Nanos phase{static_cast<std::int64_t>(rng.uniform() * static_cast<double>(kFrame.count()))};
-    const MonotonicTime edge = chain.now - kFrame + phase;
+    const Nanos phase{
+        static_cast<std::int64_t>(rng.uniform() * static_cast<double>(core::kMinorFrame.count()))};
+    const MonotonicTime edge = chain.now - core::kMinorFrame + phase;
     chain.press();
     chain.frames(10);
     ASSERT_EQ(chain.throttle, 0.0);
@@ -85,8 +85,8 @@ TEST(KillChain, StopsTheEscWithinTwoFramesInAThousandRandomPhases) {
     ASSERT_EQ(chain.throttle, 0.0);  // latched
     ASSERT_EQ(chain.esc.commands(), commands + 10);
   }
-  EXPECT_LE(worst, 2 * kFrame);
-  EXPECT_GT(worst, kFrame);
+  EXPECT_LE(worst, 2 * core::kMinorFrame);
+  EXPECT_GT(worst, core::kMinorFrame);
   RecordProperty("worst_us", static_cast<int>(worst.count() / 1000));
 }
 

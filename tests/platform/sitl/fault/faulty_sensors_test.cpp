@@ -5,13 +5,12 @@
 #include <cmath>
 #include <vector>
 
+#include "core/executive/frame_table.hpp"
 #include "platform/sitl/sensors/depth_camera.hpp"
 #include "platform/sitl/world/world.hpp"
 
 namespace roborun::sitl {
 namespace {
-
-constexpr Nanos kFrame{2'500'000};
 
 struct Bench {
   NavigationSensorsConfig config{};
@@ -25,7 +24,7 @@ struct Bench {
     sensors.connect(&line);
   }
   void frame() {
-    now += kFrame;
+    now += core::kMinorFrame;
     line.advance(now);
     state.p_WB.x() += 0.01;
     sensors.sample(now, state);
@@ -253,7 +252,7 @@ TEST(FaultyDepthCamera, EveryKindDoesWhatItsNameSays) {
     std::uint32_t sequence = 0;
     frames = 0;
     for (int i = 0; i < static_cast<int>((1.0 + for_s) * 400); ++i) {
-      now += kFrame;
+      now += core::kMinorFrame;
       line.advance(now);
       if (i == 400) line.inject({Component::kDepth, kind}, from_seconds(for_s));
       inner.expose(now, {Matrix3::Identity(), Vector3(0, 0, 4)});

@@ -6,21 +6,12 @@
 #include <cmath>
 #include <vector>
 
+#include "core/executive/frame_table.hpp"
 #include "core/geometry/camera_pose.hpp"
+#include "tests/platform/sitl/sensors/one_wall.hpp"
 
 namespace roborun::sitl {
 namespace {
-
-constexpr Nanos kFrame{2'500'000};
-
-World one_wall() {
-  WorldDescription d;
-  d.bounds_W = {{-50.0, -50.0, 0.5}, {50.0, 50.0, 15.0}};
-  d.start_W = {0.0, 0.0, 5.0};
-  d.goal_W = {5.0, 0.0, 5.0};
-  d.boxes = {{{10.0, -40.0, 0.0}, {11.0, 40.0, 40.0}}};
-  return World(d);
-}
 
 DepthCameraConfig exact() {
   DepthCameraConfig c;
@@ -31,8 +22,6 @@ DepthCameraConfig exact() {
   c.frame_dropout_ratio = 0.0;
   return c;
 }
-
-const Pose kAt5m{Matrix3::Identity(), Vector3(0.0, 0.0, 5.0)};
 
 TEST(DepthCamera, SeesAWallAtItsDepthAlongTheOpticalAxis) {
   const World world = one_wall();
@@ -62,7 +51,8 @@ TEST(DepthCamera, GivesTheNewestFrameThatHasArrivedAndNoneTwice) {
   firmware_if::DepthFrame frame;
   EXPECT_EQ(camera.read(frame), Status::kNotReady);
   MonotonicTime now{};
-  for (int k = 0; k <= 52; ++k, now += kFrame) camera.expose(now, kAt5m);  // exposures at 0, 50 and 100 ms
+  for (int k = 0; k <= 52; ++k, now += core::kMinorFrame)
+    camera.expose(now, kAt5m);  // exposures at 0, 50 and 100 ms
   ASSERT_EQ(camera.read(frame), Status::kOk);
   EXPECT_EQ(frame.stamp, MonotonicTime{} + Nanos{100'000'000});
   EXPECT_EQ(camera.read(frame), Status::kNotReady);
@@ -102,7 +92,7 @@ TEST(DepthCamera, WhatIsReadDoesNotDependOnWhatWasReadBefore) {
   firmware_if::DepthFrame a;
   firmware_if::DepthFrame b;
   MonotonicTime now{};
-  for (int k = 0; k < 400; ++k, now += kFrame) {
+  for (int k = 0; k < 400; ++k, now += core::kMinorFrame) {
     every.expose(now, kAt5m);
     last.expose(now, kAt5m);
     (void)every.read(a);
@@ -141,7 +131,7 @@ TEST(DepthCamera, HasOpticsOfItsOwn) {
     spec.range_min_m = range_min_m;
     SimulatedDepthCamera camera(world, spec, six_camera_mounts()[0], exact(), 1, 0);
     firmware_if::DepthFrame frame;
-    for (MonotonicTime now{}; now < MonotonicTime{Nanos{100'000'000}}; now += kFrame)
+    for (MonotonicTime now{}; now < MonotonicTime{Nanos{100'000'000}}; now += core::kMinorFrame)
       camera.expose(now, kAt5m);
     ASSERT_EQ(camera.read(frame), Status::kOk);
     EXPECT_EQ(frame.width, 32);

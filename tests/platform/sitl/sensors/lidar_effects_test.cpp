@@ -5,13 +5,12 @@
 #include <cmath>
 #include <vector>
 
+#include "core/executive/frame_table.hpp"
 #include "platform/sitl/sensors/lidar.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 
 namespace roborun::sitl {
 namespace {
-
-constexpr Nanos kFrame{2'500'000};
 
 WorldDescription empty() {
   WorldDescription d;
@@ -135,7 +134,7 @@ std::vector<std::array<float, 3>> sweep_of(SimulatedLidar& sut, double speed_mps
                                            Pose& X_WB) {
   firmware_if::LidarSweep sweep;
   std::vector<std::array<float, 3>> points;
-  for (MonotonicTime now{}; seconds(now.time_since_epoch()) < until_s; now += kFrame) {
+  for (MonotonicTime now{}; seconds(now.time_since_epoch()) < until_s; now += core::kMinorFrame) {
     const Pose at{Matrix3::Identity(),
                   kUp.p_RT + Vector3(speed_mps * seconds(now.time_since_epoch()), 0.0, 0.0)};
     sut.expose(now, at);
@@ -197,7 +196,7 @@ TEST(ProductLidar, WhatIsReadDoesNotDependOnWhatWasReadBefore) {
   Pose X_WB;
   const auto a = sweep_of(every, 5.0, 1.5, X_WB);
   firmware_if::LidarSweep sweep;
-  for (MonotonicTime now{}; seconds(now.time_since_epoch()) < 1.5; now += kFrame)
+  for (MonotonicTime now{}; seconds(now.time_since_epoch()) < 1.5; now += core::kMinorFrame)
     last.expose(now,
                 {Matrix3::Identity(), kUp.p_RT + Vector3(5.0 * seconds(now.time_since_epoch()), 0.0, 0.0)});
   ASSERT_EQ(last.read(sweep), Status::kOk);

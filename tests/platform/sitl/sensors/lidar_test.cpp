@@ -6,23 +6,14 @@
 #include <fstream>
 #include <limits>
 
+#include "core/executive/frame_table.hpp"
 #include "platform/input/input_error.hpp"
+#include "tests/platform/sitl/sensors/one_wall.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace roborun::sitl {
 namespace {
 
-constexpr Nanos kFrame{2'500'000};
-const Pose kAt5m{Matrix3::Identity(), Vector3(0.0, 0.0, 5.0)};
-
-World one_wall() {
-  WorldDescription d;
-  d.bounds_W = {{-50.0, -50.0, 0.5}, {50.0, 50.0, 15.0}};
-  d.start_W = {0.0, 0.0, 5.0};
-  d.goal_W = {5.0, 0.0, 5.0};
-  d.boxes = {{{10.0, -40.0, 0.0}, {11.0, 40.0, 40.0}}};
-  return World(d);
-}
 LidarSpec spec() {
   LidarSpec s;
   s.rings = 5;
@@ -37,7 +28,7 @@ constexpr LidarNoise kExact{0.0, 0.0, 0.0};
 /// The sweep at `time_s`, with what came before it read or not.
 Status sweep_at(SimulatedLidar& lidar, double time_s, firmware_if::LidarSweep& sweep, bool read_all = false) {
   Status status = Status::kNotReady;
-  for (MonotonicTime now{}; seconds(now.time_since_epoch()) < time_s; now += kFrame) {
+  for (MonotonicTime now{}; seconds(now.time_since_epoch()) < time_s; now += core::kMinorFrame) {
     lidar.expose(now, kAt5m);
     if (read_all) status = lidar.read(sweep);
   }
@@ -92,7 +83,7 @@ TEST(SimulatedLidar, LosesTheShareOfSweepsThatItIsTold) {
   SimulatedLidar sut(world, spec(), {}, {0.0, 0.0, 0.25}, 7, 0);
   firmware_if::LidarSweep sweep;
   int got = 0;
-  for (MonotonicTime now{}; seconds(now.time_since_epoch()) < 60.0; now += kFrame) {
+  for (MonotonicTime now{}; seconds(now.time_since_epoch()) < 60.0; now += core::kMinorFrame) {
     sut.expose(now, kAt5m);
     got += sut.read(sweep) == Status::kOk ? 1 : 0;
   }

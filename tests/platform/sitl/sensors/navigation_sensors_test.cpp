@@ -7,12 +7,11 @@
 #include <cmath>
 #include <vector>
 
+#include "core/executive/frame_table.hpp"
 #include "platform/sitl/sensors/delay_line.hpp"
 
 namespace roborun::sitl {
 namespace {
-
-constexpr Nanos kFrame{2'500'000};
 
 struct Statistics {
   int count{};
@@ -46,7 +45,7 @@ TEST(NavigationSensors, AtRestTheImuReadsGravityPlusBiasAndNoise) {
   Sum force;
   firmware_if::ImuSample sample;
   for (int k = 0; k < 8000; ++k) {
-    sensors.sample(MonotonicTime{} + k * kFrame, at_rest);
+    sensors.sample(MonotonicTime{} + k * core::kMinorFrame, at_rest);
     while (sensors.read(sample) == Status::kOk) {
       gyro.add(sample.angular_rate_B_radps[0]);
       force.add(sample.specific_force_B_mps2[2]);
@@ -68,7 +67,7 @@ TEST(NavigationSensors, AFixArrivesLateAndSomeNever) {
   firmware_if::GnssFix fix;
   Sum east;
   for (int k = 0; k < 40 * 1000; ++k) {
-    const MonotonicTime now = MonotonicTime{} + k * kFrame;
+    const MonotonicTime now = MonotonicTime{} + k * core::kMinorFrame;
     moving.p_WB.x() = 100.0;
     sensors.sample(now, moving);
     while (sensors.read(fix) == Status::kOk) {
@@ -90,7 +89,7 @@ TEST(NavigationSensors, TheBarometerDriftsAroundTheTruth) {
   firmware_if::BarometerSample sample;
   Sum height;
   for (int k = 0; k < 400 * 100; ++k) {
-    sensors.sample(MonotonicTime{} + k * kFrame, up);
+    sensors.sample(MonotonicTime{} + k * core::kMinorFrame, up);
     while (sensors.read(sample) == Status::kOk) height.add(sample.altitude_m);
   }
   EXPECT_NEAR(height.result().count, 5000, 20) << "50 Hz";
@@ -255,7 +254,7 @@ Second second_of(std::uint64_t seed, const VehicleState& state, int from_s) {
   Second result;
   std::array<double, 4> wave{};
   for (int k = 0; k < 400 * (from_s + 1); ++k) {
-    sensors.sample(MonotonicTime{} + k * kFrame, state);
+    sensors.sample(MonotonicTime{} + k * core::kMinorFrame, state);
     while (sensors.read(sample) == Status::kOk) {
       if (k < 400 * from_s) continue;
       result.gyro_z.add(sample.angular_rate_B_radps[2]);
@@ -305,14 +304,14 @@ TEST(ProductImu, HasAScaleAndABiasThatWanders) {
 
 TEST(DelayLine, KeepsTheOrderAndLosesTheOldestWhenFull) {
   DelayLine<int, 4> line;
-  for (int i = 0; i < 6; ++i) line.push(i, MonotonicTime{} + i * kFrame);
+  for (int i = 0; i < 6; ++i) line.push(i, MonotonicTime{} + i * core::kMinorFrame);
   int item = -1;
-  EXPECT_EQ(line.pop(item, MonotonicTime{} + kFrame), Status::kNotReady);
+  EXPECT_EQ(line.pop(item, MonotonicTime{} + core::kMinorFrame), Status::kNotReady);
   for (int i = 2; i < 6; ++i) {
-    ASSERT_EQ(line.pop(item, MonotonicTime{} + 10 * kFrame), Status::kOk);
+    ASSERT_EQ(line.pop(item, MonotonicTime{} + 10 * core::kMinorFrame), Status::kOk);
     EXPECT_EQ(item, i);
   }
-  EXPECT_EQ(line.pop(item, MonotonicTime{} + 10 * kFrame), Status::kNotReady);
+  EXPECT_EQ(line.pop(item, MonotonicTime{} + 10 * core::kMinorFrame), Status::kNotReady);
 }
 
 }  // namespace

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <vector>
 
+#include "core/executive/frame_table.hpp"
+
 namespace roborun::sitl {
 namespace {
-
-constexpr Nanos kFrame{2'500'000};
 
 /// Straight to the east at 5 m/s; every sample that came.
 std::vector<firmware_if::OdometrySample> fly(std::uint64_t seed, double for_s) {
@@ -17,7 +17,7 @@ std::vector<firmware_if::OdometrySample> fly(std::uint64_t seed, double for_s) {
   VehicleState state;
   state.v_WB = Vector3(5.0, 0.0, 0.0);
   MonotonicTime now{};
-  for (; seconds(now.time_since_epoch()) < for_s; now += kFrame) {
+  for (; seconds(now.time_since_epoch()) < for_s; now += core::kMinorFrame) {
     state.p_WB = Vector3(10.0 + 5.0 * seconds(now.time_since_epoch()), 3.0, 2.0);
     sensor.sample(now, state);
     firmware_if::OdometrySample s;
@@ -60,7 +60,7 @@ TEST(VisualOdometry, BeginsAnewAtZeroAndSaysSo) {
 
 TEST(VisualOdometry, NoModelNoSamples) {
   VisualOdometry sensor(OdometryModel::kNone, 1);
-  sensor.sample(MonotonicTime{} + kFrame, {});
+  sensor.sample(MonotonicTime{} + core::kMinorFrame, {});
   sensor.sample(MonotonicTime{} + Nanos{100'000'000}, {});
   firmware_if::OdometrySample s;
   EXPECT_EQ(sensor.read(s), Status::kNotReady);
