@@ -19,6 +19,7 @@ constexpr double kAwareV1_m3 = 1e6;
 constexpr double kRemembered_m3 = 6e3;
 constexpr double kAll_m3 = std::numeric_limits<double>::infinity();
 constexpr double kStaticSpeed_mps = 0.5;
+constexpr Nanos kInMotion{200'000'000};  // how a body moves is told from where it is in two decisions
 constexpr double kTight =
     3.0;  // published cells: where the space asks for less than that, a narrow way is one
 
@@ -98,7 +99,8 @@ const char* to_string(SpeedSource source) noexcept {
 const char* to_string(Aim aim) noexcept { return aim == Aim::kEnergy ? "energy" : "time"; }
 
 Status Policy::validate() const noexcept {
-  const bool times_ok = shortest > Nanos{0} && longest >= shortest && longest_budget >= longest;
+  const bool times_ok =
+      shortest > Nanos{0} && longest >= shortest && longest_budget >= longest && fine_within > Nanos{0};
   const bool precision_ok = core::within(failures_until_finer, 1, 100) &&
                             core::within(narrow_tries, 0, 100) &&
                             core::within(coarser_levels_per_decision, 1, kPrecisionLevels) &&
@@ -235,8 +237,8 @@ double Governor::least_s(const Task& task, int level) const noexcept {
 ///   (g - width) / 4
 /// and `cells_to_obstacle` cells must fit between the vehicle and the nearest obstacle. Then the policy:
 /// coarser only step by step, finer than 0.3 m only after failures, on narrow ways, and one level where the space asks for less than
-/// 0.6 m and the shortest decision has time for it; at most 0.6 m near the goal and on the climb. Failures ask for one level finer
-/// each. Where the finest cells take more than two of the shortest decisions, they are for ways that are narrow for what stands
+/// 0.6 m and `fine_within` has time for it; at most 0.6 m near the goal and on the climb. Failures ask for one level finer
+/// each. Where the finest cells take more than twice `fine_within`, they are for ways that are narrow for what stands
 /// there, not for holes of the cameras, and failures begin anew after two at the finest, one with each radius of the planner: where
 /// precision was not what lacked, quick looks fill holes sooner.
 int Governor::asked_level(const Task& task, Decision& d) const noexcept {
@@ -247,10 +249,10 @@ int Governor::asked_level(const Task& task, Decision& d) const noexcept {
   level = std::min(level, last_level_ + policy.coarser_levels_per_decision);
   const int fine = std::max(published_level() - 1, 0);
   const bool costs_nothing =
-      d.demand_m < 2.0 * kPublishedCell_m && least_s(task, fine) <= seconds(policy.shortest);
+      d.demand_m < 2.0 * kPublishedCell_m && least_s(task, fine) <= seconds(policy.fine_within);
   level = costs_nothing ? fine : std::max(level, published_level());
   const int finer = finer_levels(task.situation);
-  const bool cheap = least_s(task, 0) <= 2.0 * seconds(policy.shortest);
+  const bool cheap = least_s(task, 0) <= 2.0 * seconds(policy.fine_within);
   const bool tight = d.demand_m < kTight * kPublishedCell_m && task.situation.failures < policy.narrow_tries;
   if (task.situation.narrow && (cheap || tight))
     level = 0;
@@ -279,14 +281,15 @@ double Governor::deadline_s(const Task& task, int asked_level, Decision& d) cons
   }
   if (task.situation.surveying) d.time_budget = policy.longest_budget;
   double deadline_s = seconds(d.time_budget) / policy.decisions_per_budget;
-  const Nanos longest = task.situation.motion ? policy.shortest : policy.longest;
+  const Nanos shortest = task.situation.motion ? std::max(policy.shortest, kInMotion) : policy.shortest;
+  const Nanos longest = task.situation.motion ? shortest : policy.longest;
   const double useful_s = std::max(seconds(longest), least_s(task, asked_level));
   if (deadline_s >= useful_s) {
     deadline_s = useful_s;
     d.source = finer_levels(task.situation) > 0 ? BudgetSource::kFailures : BudgetSource::kLongest;
   }
-  if (deadline_s < seconds(policy.shortest)) {
-    deadline_s = seconds(policy.shortest);
+  if (deadline_s < seconds(shortest)) {
+    deadline_s = seconds(shortest);
     d.source = BudgetSource::kShortest;
   }
   return deadline_s;

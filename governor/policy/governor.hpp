@@ -38,15 +38,19 @@ struct Policy {
   /// does, at t0 + 2 T. Measured, 1.5 flies fastest: the next budget is counted from a newer frame. (The
   /// authors' code divides by 2.) [1, 10]: below 1 the answer comes after the time it is for.
   double decisions_per_budget{1.5};
-  Nanos shortest{200'000'000};  ///< No decision shorter than this. > 0.
+  Nanos shortest{
+      100'000'000};  ///< No decision shorter than this; while something moves nearby, than 0.2 s. > 0.
   /// More thinking than this makes flight slower, not better, unless the precision that the space asks for
   /// takes longer. >= shortest.
-  Nanos longest{200'000'000};
+  Nanos longest{100'000'000};
   Nanos longest_budget{15'000'000'000};  ///< The authors' cap: what a standing vehicle is given. >= longest.
   /// From this many failed decisions on, one level finer for each; after two at the finest anew, if those are dear. [1, 100]
   int failures_until_finer{2};
   /// So many decisions may fail on a narrow way before its finest cells count as one try among others. [0, 100]
   int narrow_tries{6};
+  /// Cells finer than the space asks for are taken where a decision with them takes no longer than this; after failures and on
+  /// narrow ways, than twice this. > 0.
+  Nanos fine_within{200'000'000};
   int coarser_levels_per_decision{1};  ///< Precision is lost slowly and won at once. [1, kPrecisionLevels]
   /// At least so many cells between the vehicle and the nearest obstacle. [1, 100]
   double cells_to_obstacle{2.0};

@@ -93,14 +93,14 @@ TEST_F(WhatIf, FindsAnotherFlight) {
 
 TEST_F(WhatIf, TakesSettingsTogetherInAnyOrder) {
   for (const std::vector<std::string>& settings :
-       {std::vector<std::string>{"governor.longest_s=0.1", "governor.shortest_s=0.05"},
-        std::vector<std::string>{"governor.shortest_s=0.05", "governor.longest_s=0.1"}}) {
+       {std::vector<std::string>{"governor.longest_s=0.08", "governor.shortest_s=0.05"},
+        std::vector<std::string>{"governor.shortest_s=0.05", "governor.longest_s=0.08"}}) {
     MissionConfig config = config_;
     EXPECT_NO_THROW(change_in_flight(config, flown(), kChange_s, settings));
     EXPECT_EQ(config.change.to.size(), 2U);
   }
   // Alone it goes below what is left of the other one.
-  EXPECT_NE(refusal("governor.longest_s=0.1"), "");
+  EXPECT_NE(refusal("governor.longest_s=0.08"), "");
 }
 
 TEST_F(WhatIf, GivesAGoalThen) {
