@@ -19,7 +19,6 @@ constexpr double kAwareV1_m3 = 1e6;
 constexpr double kRemembered_m3 = 6e3;
 constexpr double kAll_m3 = std::numeric_limits<double>::infinity();
 constexpr double kStaticSpeed_mps = 0.5;
-constexpr Nanos kInMotion{200'000'000};  // how a body moves is told from where it is in two decisions
 constexpr double kTight =
     3.0;  // published cells: where the space asks for less than that, a narrow way is one
 
@@ -99,8 +98,8 @@ const char* to_string(SpeedSource source) noexcept {
 const char* to_string(Aim aim) noexcept { return aim == Aim::kEnergy ? "energy" : "time"; }
 
 Status Policy::validate() const noexcept {
-  const bool times_ok =
-      shortest > Nanos{0} && longest >= shortest && longest_budget >= longest && fine_within > Nanos{0};
+  const bool times_ok = shortest > Nanos{0} && longest >= shortest && longest_budget >= longest &&
+                        shortest_in_motion > Nanos{0} && fine_within > Nanos{0};
   const bool precision_ok = core::within(failures_until_finer, 1, 100) &&
                             core::within(narrow_tries, 0, 100) &&
                             core::within(coarser_levels_per_decision, 1, kPrecisionLevels) &&
@@ -281,7 +280,8 @@ double Governor::deadline_s(const Task& task, int asked_level, Decision& d) cons
   }
   if (task.situation.surveying) d.time_budget = policy.longest_budget;
   double deadline_s = seconds(d.time_budget) / policy.decisions_per_budget;
-  const Nanos shortest = task.situation.motion ? std::max(policy.shortest, kInMotion) : policy.shortest;
+  const Nanos shortest =
+      task.situation.motion ? std::max(policy.shortest, policy.shortest_in_motion) : policy.shortest;
   const Nanos longest = task.situation.motion ? shortest : policy.longest;
   const double useful_s = std::max(seconds(longest), least_s(task, asked_level));
   if (deadline_s >= useful_s) {

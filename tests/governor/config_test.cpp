@@ -18,6 +18,7 @@ TEST(GovernorConfigDeathTest, OnlyValidOnesAreMade) {
        {"longest", [](Config& c) { c.policy.longest = c.policy.shortest - Nanos{1}; }},
        {"longest budget", [](Config& c) { c.policy.longest_budget = c.policy.longest - Nanos{1}; }},
        {"failures", [](Config& c) { c.policy.failures_until_finer = 0; }},
+       {"shortest in motion", [](Config& c) { c.policy.shortest_in_motion = Nanos{0}; }},
        {"fine within", [](Config& c) { c.policy.fine_within = Nanos{0}; }},
        {"narrow tries", [](Config& c) { c.policy.narrow_tries = -1; }},
        {"coarser levels", [](Config& c) { c.policy.coarser_levels_per_decision = 0; }},

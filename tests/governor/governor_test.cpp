@@ -144,6 +144,19 @@ TEST(Governor, AmongThinThingsSpeedFollowsTheTimeBetweenTwoLooks) {
   EXPECT_EQ(Governor(config).decide(p, situation).point.speed_limit_mps, 0.5) << "the published design";
 }
 
+TEST(Governor, DecidesLessOftenWhileSomethingMoves) {
+  GovernorConfig config = paper_config(Design::kAware);
+  for (LatencyModel& m : config.model) m = LatencyModel{};  // computing costs nothing
+  config.point_cloud_s = config.governor_s = config.smoother_s = 0.0;
+  const SpaceProfile near = open_space(0.5, 2.0), far = open_space(20.0, 2.0);
+  for (const SpaceProfile& p : {near, far}) {
+    Situation situation{0, 100.0};
+    EXPECT_EQ(Governor(config).decide(p, situation).point.deadline, config.policy.shortest);
+    situation.motion = true;
+    EXPECT_EQ(Governor(config).decide(p, situation).point.deadline, config.policy.shortest_in_motion);
+  }
+}
+
 TEST(Governor, FliesNoFasterThanWhatSpendsLeastAndSaysWhatSetsItsSpeed) {
   GovernorConfig config = paper_config(Design::kAware);
   const SpaceProfile p = open_space(20.0, 2.0);
