@@ -132,11 +132,12 @@ FrameVerdict Reassembler::take(const CanFrame& frame, Transfer& transfer) noexce
     if ((tail & (kStart | kEnd | kToggle)) != (kStart | kEnd) || header.kind != TransferKind::kMessage)
       return FrameVerdict::kMalformed;
     header.transfer_id = tail & kTransferIdMask;
-    transfer = {header, frame.stamp, frame.bytes().first(frame.size - 1U)};
+    std::ranges::copy(frame.bytes(), anonymous_.begin());
+    transfer = {header, frame.stamp, std::span<const std::uint8_t>(anonymous_).first(frame.size - 1U)};
     return FrameVerdict::kDelivered;
   }
   // Priority is no part of a sender's sequence.
-  Session& session = session_of(frame.id & ~kPriorityMask, frame.stamp);
+  Session& session = session_of(frame.id & ~kPriorityMask);
   const FrameVerdict verdict =
       (tail & kStart) != 0 ? start(session, frame, transfer) : resume(session, *type, frame, transfer);
   session.heard = frame.stamp;
@@ -151,8 +152,7 @@ FrameVerdict Reassembler::start(Session& session, const CanFrame& frame, Transfe
     session.receiving = false;
     return FrameVerdict::kMalformed;
   }
-  if (session.completed && session.completed_id == transfer_id &&
-      !timed_out(session.completed_at, frame.stamp) && same_bytes(session.completed_first, frame))
+  if (!timed_out(session.completed_at, frame.stamp) && same_bytes(session.completed_first, frame))
     return FrameVerdict::kDuplicate;
 
   session.transfer_id = transfer_id;
@@ -160,8 +160,6 @@ FrameVerdict Reassembler::start(Session& session, const CanFrame& frame, Transfe
   session.first = frame;
   if (single) {
     session.receiving = false;
-    session.completed = true;
-    session.completed_id = transfer_id;
     session.completed_at = frame.stamp;
     session.completed_first = frame;
     std::ranges::copy(frame.bytes(), session.payload.begin());
@@ -208,8 +206,6 @@ FrameVerdict Reassembler::resume(Session& session, const DataType& type, const C
   session.receiving = false;
   const std::span<const std::uint8_t> payload{session.payload.data(), session.size};
   if (crc16(payload, transfer_crc_seed(type.signature)) != session.crc) return FrameVerdict::kBadCrc;
-  session.completed = true;
-  session.completed_id = session.transfer_id;
   session.completed_at = frame.stamp;
   session.completed_first = session.first;
   transfer.header = from_can_id(session.first.id);
@@ -219,7 +215,7 @@ FrameVerdict Reassembler::resume(Session& session, const DataType& type, const C
   return FrameVerdict::kDelivered;
 }
 
-Reassembler::Session& Reassembler::session_of(std::uint32_t key, MonotonicTime stamp) noexcept {
+Reassembler::Session& Reassembler::session_of(std::uint32_t key) noexcept {
   Session* oldest = sessions_.data();
   for (Session& session : sessions_) {
     if (session.key == key) return session;
@@ -229,8 +225,6 @@ Reassembler::Session& Reassembler::session_of(std::uint32_t key, MonotonicTime s
   if (oldest->key != Session{}.key) ++counters_.evicted;
   oldest->key = key;
   oldest->receiving = false;
-  oldest->completed = false;
-  oldest->heard = stamp;
   return *oldest;
 }
 

@@ -108,9 +108,7 @@ class Reassembler {
   struct Session {
     std::uint32_t key{0xffffffff};
     std::uint8_t transfer_id{};
-    std::uint8_t completed_id{};
     bool receiving{};
-    bool completed{};
     bool toggle{};
     std::uint16_t crc{};
     std::uint16_t size{};
@@ -119,7 +117,7 @@ class Reassembler {
     MonotonicTime completed_at{};
     CanFrame first{};            ///< Of the transfer being received.
     CanFrame last{};             ///< Last frame taken.
-    CanFrame completed_first{};  ///< First frame of the last transfer delivered.
+    CanFrame completed_first{};  ///< First frame of the last transfer delivered; empty: none was.
     std::array<std::uint8_t, kMostPayload_bytes> payload{};
   };
   struct Counters {
@@ -146,11 +144,12 @@ class Reassembler {
   [[nodiscard]] FrameVerdict start(Session& session, const CanFrame& frame, Transfer& transfer) noexcept;
   [[nodiscard]] FrameVerdict resume(Session& session, const DataType& type, const CanFrame& frame,
                                     Transfer& transfer) noexcept;
-  [[nodiscard]] Session& session_of(std::uint32_t key, MonotonicTime stamp) noexcept;
+  [[nodiscard]] Session& session_of(std::uint32_t key) noexcept;
 
   std::span<const DataType> types_;
   std::span<Session> sessions_;
   std::uint8_t local_node_id_;
+  std::array<std::uint8_t, 8> anonymous_{};  ///< What was said without a node id belongs to no session.
   Counters counters_{};
 };
 

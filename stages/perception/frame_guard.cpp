@@ -75,8 +75,7 @@ Status check_shape(const PosedDepthFrame& posed) noexcept {
   const bool size_ok = f.width >= 8 && f.height >= 8 && f.width <= kMaxImageSide &&
                        f.height <= kMaxImageSide &&
                        f.depth_m.size() == std::size_t{f.width} * std::size_t{f.height};
-  const bool range_ok =
-      f.range_m > 0.0F && f.range_m <= kMaxRange_m && f.range_min_m >= 0.0F && f.range_min_m < f.range_m;
+  const bool range_ok = f.range_m <= kMaxRange_m && f.range_min_m >= 0.0F && f.range_min_m < f.range_m;
   const bool optics_ok = f.tan_half_width > 0.0F && f.tan_half_width <= kMaxTanHalfFov &&
                          f.tan_half_height > 0.0F && f.tan_half_height <= kMaxTanHalfFov;
   const bool pose_ok = is_finite(posed.X_WC.p_RT) && posed.X_WC.R_RT.allFinite();

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "core/random/counter_rng.hpp"
@@ -133,6 +136,134 @@ TEST(Fence, DecidesBoxesAsTheSlowExactReference) {
   EXPECT_GT(allowed, 10000);
 }
 
+/// Closed segments have a point in common: an end of one lies on the other, or they cross within both
+/// (0 < t, u < 1 by Cramer's rule).
+bool meet(const Node& a, const Node& b, const Node& c, const Node& d) {
+  if (on_edge(a, b, c) || on_edge(a, b, d) || on_edge(c, d, a) || on_edge(c, d, b)) return true;
+  const Node r{b.x - a.x, b.y - a.y}, s{d.x - c.x, d.y - c.y}, q{c.x - a.x, c.y - a.y};
+  Wide det = r.x * s.y - r.y * s.x, t = q.x * s.y - q.y * s.x, u = q.x * r.y - q.y * r.x;
+  if (det < 0) det = -det, t = -t, u = -u;
+  return det > 0 && 0 < t && t < det && 0 < u && u < det;
+}
+bool is_simple(const std::vector<Node>& p) {
+  const std::size_t n = p.size();
+  const auto same = [](const Node& a, const Node& b) { return a.x == b.x && a.y == b.y; };
+  for (std::size_t i = 0; i < n; ++i) {
+    const Node &a = p[i], &b = p[(i + 1) % n];
+    if (same(a, b) || on_edge(a, b, p[(i + 2) % n]) || on_edge(b, p[(i + 2) % n], a)) return false;
+    for (std::size_t k = 0; k < n; ++k) {
+      if (k == i || (k + 1) % n == i || (i + 1) % n == k) continue;
+      if (meet(a, b, p[k], p[(k + 1) % n])) return false;
+    }
+  }
+  return true;
+}
+
+TEST(Fence, RefusesExactlyThePolygonsThatTouchThemselves) {
+  CounterRng rng(34);
+  int simple = 0;
+  constexpr int kRounds = 200'000;
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<Node> nodes;
+    std::vector<FencePoint> points;
+    const std::size_t count = 3 + static_cast<std::size_t>(rng.below(4));
+    for (std::size_t i = 0; i < count; ++i) {
+      nodes.push_back(random_node(rng, 2));
+      points.push_back({static_cast<double>(nodes.back().x), static_cast<double>(nodes.back().y)});
+    }
+    Fence fence;
+    const bool wanted = is_simple(nodes);
+    ASSERT_EQ(fence.add_polygon(FenceSide::kKeepIn, points),
+              wanted ? FenceFault::kNone : FenceFault::kTouchesItself)
+        << "round " << round;
+    simple += wanted ? 1 : 0;
+  }
+  EXPECT_GT(simple, kRounds / 10);
+  EXPECT_LT(simple, kRounds * 9 / 10);
+}
+
+TEST(Fence, LooksAtNoPointBehindThoseOfAPolygon) {
+  const std::array<FencePoint, 4> points{{{0, 0}, {1, 0}, {0, 1}, {1, 0}}};
+  Fence fence;
+  EXPECT_EQ(fence.add_polygon(FenceSide::kKeepIn, std::span(points).first(3)), FenceFault::kNone);
+  EXPECT_EQ(fence.areas()[0].count, 3U);
+}
+
+TEST(Fence, ReachesToItsFarthestPoint) {
+  constexpr double kEnd_m = 16000.0, kBeyond_m = 16000.5;
+  const auto polygon = [](double x_m, double y_m) {
+    Fence fence;
+    return fence.add_polygon(FenceSide::kKeepIn, std::array<FencePoint, 3>{{{0, 0}, {x_m, 0}, {0, y_m}}});
+  };
+  EXPECT_EQ(polygon(kEnd_m, -kEnd_m), FenceFault::kNone);
+  EXPECT_EQ(polygon(kBeyond_m, 1.0), FenceFault::kNotFinite);
+  EXPECT_EQ(polygon(1.0, -kBeyond_m), FenceFault::kNotFinite);
+  const auto circle = [](double x_m, double y_m, double radius_m) {
+    Fence fence;
+    return fence.add_circle(FenceSide::kKeepIn, {x_m, y_m}, radius_m);
+  };
+  EXPECT_EQ(circle(kEnd_m, -kEnd_m, kEnd_m), FenceFault::kNone);
+  EXPECT_EQ(circle(kBeyond_m, 0.0, 1.0), FenceFault::kNotFinite);
+  EXPECT_EQ(circle(0.0, kBeyond_m, 1.0), FenceFault::kNotFinite);
+  EXPECT_EQ(circle(0.0, 0.0, kBeyond_m), FenceFault::kNotFinite);
+  Fence heights;
+  EXPECT_EQ(heights.set_altitude(0.0, kBeyond_m), FenceFault::kNotFinite);
+  EXPECT_EQ(heights.set_altitude(-kBeyond_m, 0.0), FenceFault::kNotFinite);
+  EXPECT_FALSE(heights.limits_altitude());
+  EXPECT_EQ(heights.set_altitude(-kEnd_m, kEnd_m), FenceFault::kNone);
+}
+
+TEST(Fence, JudgesBoxesUpToTwiceAsFar) {
+  Fence fence;
+  ASSERT_EQ(fence.add_circle(FenceSide::kKeepOut, {0, 0}, 0.5), FenceFault::kNone);
+  const auto allows = [&fence](double x0, double y0, double x1, double y1) {
+    return fence.allows(Aabb{{x0, y0, 1.0}, {x1, y1, 2.0}});
+  };
+  constexpr double kEnd_m = 32000.0, kBeyond_m = 32001.0;
+  EXPECT_TRUE(allows(-kEnd_m, -kEnd_m, -9.0, -9.0));
+  EXPECT_TRUE(allows(9.0, 9.0, kEnd_m, kEnd_m));
+  EXPECT_FALSE(allows(-kBeyond_m, 5.0, -9.0, 9.0));
+  EXPECT_FALSE(allows(5.0, -kBeyond_m, 9.0, -9.0));
+  EXPECT_FALSE(allows(5.0, 5.0, kBeyond_m, 9.0));
+  EXPECT_FALSE(allows(5.0, 5.0, 9.0, kBeyond_m));
+  EXPECT_FALSE(allows(5.0, 9.0, 6.0, 5.0)) << "an empty box";
+  EXPECT_FALSE(allows(0.2, 0.2, 9.0, 9.0)) << "a corner in the small circle";
+  EXPECT_TRUE(allows(0.4, 0.4, 9.0, 9.0)) << "past it at 0.57 m";
+}
+
+TEST(Fence, WithoutAnAreaAllowsAnyPlaceThatIsOne) {
+  Fence fence;
+  EXPECT_TRUE(fence.allows_over_ground(Aabb{{-1e6, -1e6, 0.0}, {1e6, 1e6, 1.0}}));
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  EXPECT_FALSE(fence.allows_over_ground(Aabb{{-kInfinity, 0.0, 0.0}, {1.0, 1.0, 1.0}}));
+  EXPECT_FALSE(fence.allows_over_ground(Aabb{{0.0, 0.0, 0.0}, {1.0, kInfinity, 1.0}}));
+  EXPECT_FALSE(fence.allows_over_ground(Aabb{{kNaN, 0.0, 0.0}, {1.0, 1.0, 1.0}}));
+}
+
+// Both axes, and a centre that is not on one of them.
+TEST(Fence, CirclesAreRound) {
+  const auto allows = [](FenceSide side, double x0, double y0, double x1, double y1) {
+    Fence fence;
+    EXPECT_EQ(fence.add_circle(side, {20.0, 10.0}, 5.0), FenceFault::kNone);
+    EXPECT_EQ(fence.areas()[0].count, 1U);
+    return fence.allows(Aabb{{x0, y0, 1.0}, {x1, y1, 2.0}});
+  };
+  for (const int turn : {0, 1, 2, 3}) {
+    const double c = turn == 0 ? 1.0 : turn == 2 ? -1.0 : 0.0, s = turn == 1 ? 1.0 : turn == 3 ? -1.0 : 0.0;
+    const auto box = [&](FenceSide side, double u0, double v0, double u1, double v1) {
+      const double xa = c * u0 - s * v0, xb = c * u1 - s * v1, ya = s * u0 + c * v0, yb = s * u1 + c * v1;
+      return allows(side, 20.0 + std::min(xa, xb), 10.0 + std::min(ya, yb), 20.0 + std::max(xa, xb),
+                    10.0 + std::max(ya, yb));
+    };
+    EXPECT_FALSE(box(FenceSide::kKeepIn, -1.0, 3.0, 3.0, 4.0)) << turn;
+    EXPECT_TRUE(box(FenceSide::kKeepIn, -1.0, 3.0, 2.9, 4.0)) << turn;
+    EXPECT_FALSE(box(FenceSide::kKeepOut, 3.0, 4.0, 9.0, 9.0)) << turn;
+    EXPECT_TRUE(box(FenceSide::kKeepOut, 3.1, 4.0, 9.0, 9.0)) << turn;
+    EXPECT_FALSE(box(FenceSide::kKeepOut, -9.0, 4.9, 9.0, 9.0)) << turn;
+    EXPECT_TRUE(box(FenceSide::kKeepOut, -9.0, 5.1, 9.0, 9.0)) << turn;
+  }
+}
+
 TEST(Fence, CirclesKeepInAndOut) {
   Fence in;
   ASSERT_EQ(in.add_circle(FenceSide::kKeepIn, {10.0, 0.0}, 5.0), FenceFault::kNone);
@@ -198,6 +329,12 @@ TEST(Fence, RefusesBadAreasByNameAndStaysAsItWas) {
   EXPECT_EQ(add({{0, 0}, {0, 0}, {1, 0}, {0, 1}}), FenceFault::kTouchesItself) << "a point twice";
   EXPECT_EQ(add({{0, 0}, {4, 0}, {4, 4}, {2, 0}, {0, 4}}), FenceFault::kTouchesItself) << "a tip on an edge";
   EXPECT_EQ(add({{0, 0}, {2, 0}, {4, 0}, {4, 4}, {0, 4}}), FenceFault::kNone) << "a point on a straight side";
+  P most;
+  for (std::size_t i = 0; i < Fence::kMaxPoints; ++i) {
+    const double x_m = static_cast<double>(i) - 15.5;
+    most.push_back({x_m, x_m * x_m});  // a parabola
+  }
+  EXPECT_EQ(add(most), FenceFault::kNone);
   EXPECT_EQ(add(P(Fence::kMaxPoints + 1, {0, 0})), FenceFault::kTooManyPoints);
   Fence fence;
   EXPECT_EQ(fence.add_circle(FenceSide::kKeepIn, {0, 0}, 0.0), FenceFault::kRadius);
@@ -208,6 +345,8 @@ TEST(Fence, RefusesBadAreasByNameAndStaysAsItWas) {
   for (std::size_t i = 0; i < Fence::kMaxAreas; ++i)
     EXPECT_EQ(fence.add_circle(FenceSide::kKeepIn, {0, 0}, 9.0), FenceFault::kNone);
   EXPECT_EQ(fence.add_circle(FenceSide::kKeepIn, {0, 0}, 9.0), FenceFault::kTooManyAreas);
+  EXPECT_EQ(fence.add_polygon(FenceSide::kKeepIn, P{{0, 0}, {1, 0}, {0, 1}}), FenceFault::kTooManyAreas);
+  EXPECT_EQ(fence.areas().size(), Fence::kMaxAreas);
 }
 
 TEST(Fence, FaultsSayWhatWouldBeRight) {

@@ -166,6 +166,16 @@ TEST(TransmitGate, ForgetsAKillOnlyWithAReleasedSwitch) {
   ASSERT_EQ(rig.sut.reset_kill(kill_switch.sut), Status::kOk);
   EXPECT_EQ(rig.command({100, 100, 100, 100}).cmd.items[0], 0) << "disarmed until armed again";
   EXPECT_EQ(rig.sut.arm(kill_switch.sut), Status::kOk);
+  const Switch never_read;
+  EXPECT_EQ(rig.sut.reset_kill(never_read.sut), Status::kNotReady);
+}
+
+TEST(TransmitGate, IsNotLiveBeforeItsFirstBeat) {
+  Rig rig;
+  ASSERT_EQ(rig.sut.arm_unproven(), Status::kOk);
+  EXPECT_FALSE(rig.sut.live(MonotonicTime{}));
+  rig.sut.beat(MonotonicTime{});
+  EXPECT_TRUE(rig.sut.live(MonotonicTime{}));
 }
 
 TEST(TransmitGate, RefusesABeatFromTheFuture) {
@@ -188,6 +198,7 @@ TEST(TransmitGate, ClampsToForwardAndLimitsTheRiseOnly) {
   EXPECT_EQ(out.cmd.items[1], 500);
   EXPECT_EQ(out.cmd.items[2], 0);
   EXPECT_EQ(out.cmd.items[3], 819);
+  EXPECT_EQ(rig.sut.counters().limited, 2U);
   for (int i = 0; i < 20; ++i) out = rig.command({8191, 8191, 8191, 8191});
   EXPECT_EQ(out.cmd.items[0], 8191);
   out = rig.command({0, 1, 8000, 8191});
@@ -199,21 +210,101 @@ TEST(TransmitGate, ClampsToForwardAndLimitsTheRiseOnly) {
   EXPECT_EQ(out.cmd.items[0], 3276);
 }
 
+TEST(TransmitGate, RisesFromZeroWithItsFirstCommand) {
+  Rig rig;
+  ASSERT_EQ(rig.sut.arm_unproven(), Status::kOk);
+  EXPECT_EQ(rig.command({100, 0, 0, 0}).cmd.items[0], 0) << "no time has passed since a command before";
+  EXPECT_EQ(rig.command({100, 0, 0, 0}).cmd.items[0], 100);
+}
+
+TEST(TransmitGate, RisesAsFastAsItsConfigSays) {
+  test::RecordingBus bus;
+  TransmitGate sut({.rise_per_s = 1'000'000}, bus);
+  sut.set_node_id(10);
+  ASSERT_EQ(sut.arm_unproven(), Status::kOk);
+  EscRawCommand out;
+  for (const int ms : {0, 2}) {
+    sut.beat(at(milliseconds{ms}));
+    ASSERT_EQ(sut.send(throttles({8191, 8191, 8191, 8191}), at(milliseconds{ms})), Status::kOk);
+  }
+  const CanFrame& frame = bus.sent.back();
+  ASSERT_EQ(dronecan::decode(frame.bytes().first(frame.size - 1U), out), Status::kOk);
+  EXPECT_EQ(out.cmd.items[0], 2000);
+}
+
+TEST(TransmitGate, WhatTheBusDidNotTakeIsNoThrottleToRiseFrom) {
+  Rig rig;
+  ASSERT_EQ(rig.sut.arm_unproven(), Status::kOk);
+  (void)rig.command({0, 0, 0, 0});
+  rig.bus.answer = Status::kNotReady;
+  rig.now += microseconds{2500};
+  rig.sut.beat(rig.now);
+  EXPECT_EQ(rig.sut.send(throttles({8191, 8191, 8191, 8191}), rig.now), Status::kNotReady);
+  rig.bus.answer = Status::kOk;
+  EXPECT_EQ(rig.command({8191, 8191, 8191, 8191}).cmd.items[0], 819);
+}
+
+TEST(TransmitGate, CountsThrottlesThatItTookAway) {
+  Rig rig;
+  (void)rig.command({0, 5, 0, -7});  // disarmed
+  EXPECT_EQ(rig.sut.counters().zeroed, 2U);
+  EXPECT_EQ(rig.sut.counters().limited, 0U);
+}
+
 TEST(TransmitGate, RefusesAnyOtherNumberOfThrottles) {
   Rig rig;
   for (std::size_t n = 0; n <= 20; ++n) {
     EscRawCommand command;
     for (std::size_t i = 0; i < n; ++i) ASSERT_TRUE(command.cmd.push_back(1));
     rig.now += milliseconds{10};
-    EXPECT_EQ(rig.sut.send(command, rig.now) == Status::kOk, n == 4) << n;
+    EXPECT_EQ(rig.sut.send(command, rig.now), n == 4 ? Status::kOk : Status::kInvalidArgument) << n;
   }
   EXPECT_EQ(rig.bus.sent.size(), 1U);
+  EXPECT_EQ(rig.sut.counters().sent, 1U);
+  EXPECT_EQ(rig.sut.counters().refused, 20U);
 }
 
 TEST(TransmitGate, RefusesAMessageThatIsNotOnItsList) {
   Rig rig;
   EXPECT_EQ(rig.sut.send(dronecan::RawImu{}, rig.now), Status::kInvalidArgument);
   EXPECT_TRUE(rig.bus.sent.empty());
+}
+
+TEST(TransmitGate, RefusesMoreBytesThanItsTypeHas) {
+  Rig rig;
+  const std::array<std::uint8_t, 8> bytes{};
+  EXPECT_EQ(
+      rig.sut.send({.kind = TransferKind::kMessage, .data_type_id = 341, .priority = 24}, bytes, rig.now),
+      Status::kInvalidArgument);
+  EXPECT_EQ(
+      rig.sut.send({.kind = TransferKind::kMessage, .data_type_id = 1030, .priority = 4}, bytes, rig.now),
+      Status::kInvalidArgument)
+      << "four throttles and half of one";
+}
+
+TEST(TransmitGate, AsksForANodeIdWithoutOneInOneFrame) {
+  Rig rig;
+  rig.sut.set_node_id(0);
+  EXPECT_EQ(rig.sut.send(dronecan::Allocation{}, rig.now), Status::kOk) << "of its own priority";
+  const std::array<std::uint8_t, 8> two_frames{};
+  rig.now += std::chrono::seconds{1};
+  EXPECT_EQ(
+      rig.sut.send({.kind = TransferKind::kMessage, .data_type_id = 1, .priority = 30}, two_frames, rig.now),
+      Status::kInvalidArgument);
+  EXPECT_EQ(rig.bus.sent.size(), 1U);
+}
+
+TEST(TransmitGate, AnswersWithTheTransferIdOfTheQuestion) {
+  Rig rig;
+  const std::array<std::uint8_t, 7> bytes{};
+  EXPECT_EQ(rig.sut.send({.kind = TransferKind::kResponse,
+                          .data_type_id = 1,
+                          .destination_node_id = 42,
+                          .priority = 24,
+                          .transfer_id = 7},
+                         bytes, rig.now),
+            Status::kOk);
+  EXPECT_EQ(rig.bus.sent.back().data[7] & 0x1fU, 7U);
 }
 
 TEST(TransmitGate, KeepsTheRateAndCountsTransferIds) {
@@ -240,6 +331,7 @@ TEST(TransmitGate, SpendsTheTransferIdWhenTheBusRefuses) {
   EXPECT_EQ(rig.sut.send(throttles({0, 0, 0, 0}), at(milliseconds{10})), Status::kOk);
   EXPECT_EQ(rig.bus.sent.back().data[7] & 0x1fU, 1U);
   EXPECT_EQ(rig.sut.counters().no_room, 1U);
+  EXPECT_EQ(rig.sut.counters().sent, 1U);
 }
 
 TEST(TransmitGate, HoldsThePackageUntilReleaseIsAllowed) {
@@ -251,6 +343,13 @@ TEST(TransmitGate, HoldsThePackageUntilReleaseIsAllowed) {
   rig.sut.allow_release(true);
   EXPECT_EQ(rig.sut.send(release, at(milliseconds{200})), Status::kOk);
   EXPECT_EQ(rig.bus.sent.size(), 2U);
+  const std::array<std::uint8_t, 1> cut{};
+  EXPECT_EQ(rig.sut.send({.kind = TransferKind::kMessage, .data_type_id = 1070, .priority = 16}, cut,
+                         at(milliseconds{300})),
+            Status::kInvalidArgument);
+  rig.sut.kill();
+  EXPECT_EQ(rig.sut.send(release, at(milliseconds{400})), Status::kInvalidArgument) << "never once killed";
+  EXPECT_EQ(rig.sut.send(hold, at(milliseconds{500})), Status::kOk);
 }
 
 TEST(TransmitGate, DoesNotAllocate) {

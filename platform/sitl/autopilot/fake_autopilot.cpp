@@ -20,7 +20,7 @@ constexpr Nanos kDisarmDelay{10'000'000'000};
 constexpr Nanos kSpoolUp{1'500'000'000};
 constexpr Nanos kLandedFor{1'000'000'000};
 constexpr Nanos kStreamAge{500'000'000};  // PX4: at least 2 Hz
-constexpr double kMostSetPoint = 1000.0;
+constexpr double kMostSpeed = 1000.0;     // m/s, and of an acceleration m/s2; a place may lie anywhere
 // An attitude loop follows an acceleration so late. Chosen on the measured steps.
 constexpr double kAttitudeLag_s = 0.03;
 constexpr double kReturnHeight_m = 30.0;
@@ -264,7 +264,8 @@ bool FakeAutopilot::take_axes(const SetPositionTargetLocalNed& m, Target& target
   if (m.coordinate_frame != 1) return false;
   const std::array<float, 9> values{m.x, m.y, m.z, m.vx, m.vy, m.vz, m.afx, m.afy, m.afz};
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const bool fine = std::fabs(static_cast<double>(values.at(i))) <= kMostSetPoint;  // false for NaN
+    const double most = i < 3 ? std::numeric_limits<double>::max() : kMostSpeed;
+    const bool fine = std::fabs(static_cast<double>(values.at(i))) <= most;  // false for NaN
     if (given(1U << i) && !fine) return false;
   }
   target.p_W = origin_W_ + vector_of(swap_world(wide(m.x, m.y, m.z)));

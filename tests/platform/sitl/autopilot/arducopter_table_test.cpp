@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "tests/platform/sitl/autopilot/bench.hpp"
 
@@ -157,6 +158,25 @@ TEST(FakeArduCopter, NeverForgetsAPosition) {
   sut.run(1.0, [&] { sut.set_point(kPositionYaw, goal_W, Vector3::Zero()); });
   sut.run(14.0);
   EXPECT_NEAR((sut.truth().p_WB - goal_W).norm(), 0.0, 0.5);
+}
+
+// What is refused stops it: a place may lie anywhere, a speed may not be any.
+TEST(FakeArduCopter, TakesPlacesOfAnyDistanceButNoSpeedBeyond1000) {
+  AutopilotBench sut(mav::AutopilotKind::kArduCopter, quad());
+  sut.take_off();
+  const auto refused = [&sut](std::uint16_t mask, const Vector3& p_W, const Vector3& v_W) {
+    const auto before = sut.fake().counters();
+    sut.set_point(mask, p_W, v_W);
+    const auto after = sut.fake().counters();
+    EXPECT_EQ(after.set_points + after.refused_set_points, before.set_points + before.refused_set_points + 1);
+    return after.refused_set_points > before.refused_set_points;
+  };
+  const Vector3 none = Vector3::Zero();
+  EXPECT_FALSE(refused(kPositionYaw, {1200.0, -5000.0, 10.0}, none));
+  EXPECT_TRUE(refused(kPositionYaw, {std::nan(""), 0.0, 10.0}, none));
+  EXPECT_TRUE(refused(kPositionYaw, {0.0, 0.0, std::numeric_limits<double>::infinity()}, none));
+  EXPECT_FALSE(refused(kVelocityYaw, none, {1000.0, 0.0, 0.0}));
+  EXPECT_TRUE(refused(kVelocityYaw, none, {0.0, 1000.5, 0.0}));
 }
 
 }  // namespace
