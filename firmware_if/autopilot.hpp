@@ -97,6 +97,9 @@ class Autopilot {
   /// For a vehicle that has landed: nothing else is sent from now on, and this by step() until it is disarmed or the pilot's,
   /// at most 10 times. Only if it is ours or being taken.
   virtual void disarm() noexcept = 0;
+  /// For a vehicle that does not follow our descent: down by the autopilot's own landing. Asked for like disarm(), until its mode
+  /// has changed; nothing else is sent.
+  virtual void land() noexcept = 0;
   /// Motors off, also in the air: asked for like disarm(). One that is lost or the pilot's is only let go.
   virtual void terminate() noexcept = 0;
   [[nodiscard]] virtual AutopilotReport report() const noexcept = 0;

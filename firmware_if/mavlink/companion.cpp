@@ -12,7 +12,7 @@
 namespace roborun::firmware_if::mavlink {
 namespace {
 
-constexpr std::uint16_t kFlightTermination = 185;
+constexpr std::uint16_t kNavLand = 21;  // PX4 and ArduCopter change into their mode Land
 constexpr std::uint8_t kArmedFlag = 128;
 constexpr double kJump_m = 0.5;
 constexpr std::int64_t kBackwards_ns = 1'000'000'000;
@@ -153,6 +153,8 @@ void Companion::tell(const CommandAck& ack) noexcept {
 }
 
 void Companion::disarm() noexcept { end(kArmDisarm); }
+
+void Companion::land() noexcept { end(kNavLand); }
 
 void Companion::terminate() noexcept { end(kFlightTermination); }
 

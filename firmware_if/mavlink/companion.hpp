@@ -82,6 +82,7 @@ class Companion final : public Autopilot {
   void take_command(double height_m) noexcept override;
   void let_go() noexcept override { let_go_ = true; }
   void disarm() noexcept override;
+  void land() noexcept override;
   void terminate() noexcept override;
   [[nodiscard]] AutopilotReport report() const noexcept override {
     return {stage_, reason_, subject_, armed_, in_air_, battery_ratio_};

@@ -213,7 +213,7 @@ void Companion::repeat_end(MonotonicTime now) noexcept {
   if (end_command_ == 0 || (tries_ > 0 && now - tried_at_ < kRetry)) return;
   tried_at_ = now;
   ++tries_;
-  send_command(end_command_, end_command_ == kArmDisarm ? 0.0F : 1.0F, 0.0F);
+  send_command(end_command_, end_command_ == kFlightTermination ? 1.0F : 0.0F, 0.0F);
 }
 
 void Companion::check_silence(MonotonicTime now) noexcept {

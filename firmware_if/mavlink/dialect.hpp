@@ -12,7 +12,8 @@
 
 namespace roborun::firmware_if::mavlink {
 
-inline constexpr std::uint16_t kArmDisarm = 400;  ///< MAV_CMD_COMPONENT_ARM_DISARM.
+inline constexpr std::uint16_t kArmDisarm = 400;          ///< MAV_CMD_COMPONENT_ARM_DISARM.
+inline constexpr std::uint16_t kFlightTermination = 185;  ///< MAV_CMD_DO_FLIGHTTERMINATION.
 
 enum class AutopilotKind : std::uint8_t { kPx4, kArduCopter };
 

@@ -22,6 +22,8 @@ constexpr double kNearGround_m = 1.5;  // over the take-off's height: from there
 constexpr double kTouchdown_mps = 0.5;
 constexpr double kBelowGround_m = 500.0;  // the reference goes on until the vehicle stands on something
 constexpr Nanos kLanded{1'000'000'000};
+constexpr double kNotFollowed_m =
+    3.0;  // an autopilot that follows a descent is not so high over its set-point
 
 /// Straight up from the ground to the height of the first hover.
 Trajectory take_off(const Vector3& ground_W, double cruise_m, double speed_mps, MonotonicTime start) {
@@ -268,6 +270,7 @@ void FlightControl::track(MonotonicTime now, firmware_if::Autopilot& autopilot) 
   (void)autopilot.command(
       now, {array(reference_.p_W + shift_W_), array(reference_.v_W), array(reference_.a_W), yaw_rad_});
   if (!descending_) return;
+  if (autopilot.report().in_air && state.p_WB.z() > reference_.p_W.z() + kNotFollowed_m) autopilot.land();
   // The autopilot's landing detector has its own witnesses; ours is that it stands still.
   if (autopilot.report().in_air || std::fabs(state.v_WB.z()) > kStand_mps) moving_ = now;
   landed_ = now - moving_ >= kLanded;

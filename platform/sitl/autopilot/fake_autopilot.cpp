@@ -169,6 +169,10 @@ void FakeAutopilot::on_command(MonotonicTime now, const CommandLong& c) noexcept
     case 511:
       result = set_interval(now, static_cast<std::uint32_t>(c.param1), static_cast<double>(c.param2));
       break;
+    case 21:
+      set_mode(Mode::kLand);
+      result = kAccepted;
+      break;
     case 176:
       result = change_mode(now, static_cast<double>(c.param2));
       break;
@@ -281,7 +285,7 @@ bool FakeAutopilot::take_axes(const SetPositionTargetLocalNed& m, Target& target
 
 void FakeAutopilot::on_set_point(MonotonicTime now, const SetPositionTargetLocalNed& m) noexcept {
   Target target;
-  const bool valid = take_axes(m, target);
+  const bool valid = take_axes(m, target) && !refuses_set_points;
   if (is_px4() && !valid) {
     ++counters_.refused_set_points;
     return;  // dropped, and no sign of life

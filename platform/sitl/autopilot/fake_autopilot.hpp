@@ -60,6 +60,7 @@ class FakeAutopilot {
   void pilot_takes(Mode mode) noexcept { set_mode(mode); }
   void pilot_disarms() noexcept { armed_ = false; }
   bool never_arms{false};                          ///< Its checks before arming fail.
+  bool refuses_set_points{false};                  ///< Of any content.
   std::optional<std::uint8_t> landed_state;        ///< It says this of itself, whatever is true.
   bool is_mute_of_landing{false};                  ///< No EXTENDED_SYS_STATE.
   firmware_if::mavlink::GpsGlobalOrigin origin{};  ///< Of its local frame, as it tells it.

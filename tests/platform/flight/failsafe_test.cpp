@@ -173,6 +173,7 @@ class ScriptedAutopilot final : public firmware_if::Autopilot {
   void take_command(double height_m) noexcept override { taken_m = height_m; }
   void let_go() noexcept override {}
   void disarm() noexcept override { disarmed = true; }
+  void land() noexcept override { asked_to_land = true; }
   void terminate() noexcept override {}
   [[nodiscard]] firmware_if::AutopilotReport report() const noexcept override { return told; }
   [[nodiscard]] const firmware_if::AutopilotLimits& limits() const noexcept override { return limits_; }
@@ -182,6 +183,7 @@ class ScriptedAutopilot final : public firmware_if::Autopilot {
   firmware_if::AutopilotSetPoint last{};
   std::optional<double> taken_m;
   bool disarmed{false};
+  bool asked_to_land{false};
 
  private:
   firmware_if::AutopilotLimits limits_{};
@@ -240,6 +242,31 @@ TEST(FlightControl, LeadsAnAutopilotThatComesBackMovingToAStopAndNotBack) {
   }
   EXPECT_LT(stop.at_s(stop.duration_s()).v_W.norm(), 1e-6);
   EXPECT_NEAR((stop.end_W() - f.p_W).norm(), 0.5 * f.v_W.norm() * stop.duration_s(), 0.02);
+}
+
+TEST(FlightControl, LeavesTheLandingToAnAutopilotThatDoesNotFollowTheDescent) {
+  for (const bool follows : {true, false}) {
+    LedFlight f;
+    f.tell(AutopilotStage::kReady, false, false);
+    f.run(1.5);
+    f.tell(AutopilotStage::kOurs, true, true);
+    f.p_W.z() = 6.0;
+    f.run(1.0);
+    ASSERT_TRUE(f.sut.flying());
+    f.run(8.0);
+    f.sut.descend(f.now, 0.5);
+    if (follows) f.v_W = {0.0, 0.0, -0.5};
+    f.run(5.0);
+    EXPECT_FALSE(f.autopilot.asked_to_land) << "2.5 m of it";
+    f.run(2.0);
+    EXPECT_EQ(f.autopilot.asked_to_land, !follows);
+    if (!follows) continue;
+    f.v_W.setZero();  // it stands on something, and knows
+    f.tell(AutopilotStage::kOurs, true, false);
+    f.run(10.0);
+    EXPECT_FALSE(f.autopilot.asked_to_land);
+    EXPECT_TRUE(f.sut.landed());
+  }
 }
 
 TEST(FlightControl, TakesAnAutopilotOverWhoseClimbIsWithdrawn) {

@@ -57,6 +57,34 @@ TEST_P(LinkCut, AtTenRandomMomentsTheVehicleStandsAndHasTouchedNothing) {
   EXPECT_GT(fastest_mps, 2.0) << "there was something to stop";
 }
 
+/// An ArduCopter that refuses what it is told stands still in our mode, for ever: PX4 would leave the mode by itself. The failsafe
+/// notices (it is not where it is led to, as in wind), and what does not follow the descent comes down by its own landing.
+TEST(DeafAutopilot, ComesDownByItsOwnLanding) {
+  const sitl::World world = middle_world();
+  const MissionConfig config = autopilot_config(AutopilotKind::kArduCopter);
+  for (const double deaf_s : {40.0, 90.0}) {
+    const auto sut = std::make_unique<AutopilotFlight>(world, config);
+    while (sut->now_s() < deaf_s) sut->step();
+    ASSERT_EQ(sut->stage(), firmware_if::AutopilotStage::kOurs);
+    sitl::FakeAutopilot& fake = sut->aircraft().fake();
+    fake.refuses_set_points = true;
+    bool touched = false;
+    while (fake.armed() && sut->now_s() < deaf_s + 90.0) {
+      sut->step();
+      const sitl::VehicleState& s = sut->truth();
+      const bool in_air = s.p_WB.z() > sut->ground_m() + config.flight.vehicle.radius_m + 0.3;
+      touched = touched || (in_air && world.clearance_m(s.p_WB, 5.0) < config.flight.vehicle.radius_m);
+    }
+    std::printf("deaf at %.0f s: down after %.1f s\n", deaf_s, sut->now_s() - deaf_s);
+    EXPECT_FALSE(touched);
+    EXPECT_EQ(fake.mode(), sitl::FakeAutopilot::Mode::kLand);
+    EXPECT_FALSE(fake.armed());
+    EXPECT_TRUE(sut->truth().on_ground);
+    for (int k = 0; k < 800; ++k) sut->step();
+    EXPECT_TRUE(sut->system().control().landed()) << "we know it too";
+  }
+}
+
 /// The rule for a link that returns (platform/flight/README.md): ArduCopter has stayed in its mode and is led on; PX4 has left
 /// it by itself, and nobody takes it back.
 /// The last cut is where the goal is near: it is reached before.

@@ -371,6 +371,27 @@ TEST_P(CompanionContract, TerminatesWhatItLeadsAndNotWhatAPilotFlies) {
   }
 }
 
+TEST_P(CompanionContract, LandsByTheAutopilotsOwnModeOnRequest) {
+  for (const bool pilot : {false, true}) {
+    const auto sut = lane();
+    sut->run(25.0);
+    ASSERT_EQ(sut->stage(), AutopilotStage::kOurs);
+    if (pilot) {
+      sut->fake().pilot_takes(Mode::kHold);
+      sut->run(0.3);
+    }
+    sut->aircraft().cut(true);
+    sut->companion().land();
+    sut->run(0.3);
+    sut->aircraft().cut(false);
+    sut->run(25.0);
+    EXPECT_EQ(sut->fake().mode(), pilot ? Mode::kHold : Mode::kLand) << "the pilot is not disturbed";
+    EXPECT_EQ(sut->truth().on_ground, !pilot);
+    EXPECT_EQ(sut->fake().armed(), pilot);
+    EXPECT_EQ(sut->stage(), AutopilotStage::kPilots);
+  }
+}
+
 TEST_P(CompanionContract, IsTakenOverInItsClimbOnRequest) {
   if (is_px4()) GTEST_SKIP() << "it has no take-off of its own";
   const auto sut = lane();
