@@ -270,9 +270,10 @@ void FlightControl::track(MonotonicTime now, firmware_if::Autopilot& autopilot) 
   (void)autopilot.command(
       now, {array(reference_.p_W + shift_W_), array(reference_.v_W), array(reference_.a_W), yaw_rad_});
   if (!descending_) return;
-  if (autopilot.report().in_air && state.p_WB.z() > reference_.p_W.z() + kNotFollowed_m) autopilot.land();
+  const bool in_air = autopilot.report().in_air;
+  if (in_air && state.p_WB.z() > reference_.p_W.z() + kNotFollowed_m) autopilot.land();
   // The autopilot's landing detector has its own witnesses; ours is that it stands still.
-  if (autopilot.report().in_air || std::fabs(state.v_WB.z()) > kStand_mps) moving_ = now;
+  if (in_air || std::fabs(state.v_WB.z()) > kStand_mps) moving_ = now;
   landed_ = now - moving_ >= kLanded;
 }
 

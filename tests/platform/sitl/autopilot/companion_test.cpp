@@ -352,19 +352,26 @@ TEST_P(CompanionContract, AsksForDisarmingTenTimesAndNotOfAPilot) {
   }
 }
 
+/// Led, or a pilot's by then; the last word is said while the line is cut for 0.3 s. False: it was never led.
+template <typename Word>
+bool is_led_until_told(Lane& sut, bool pilot, Word&& last_word) {
+  sut.run(25.0);
+  if (sut.stage() != AutopilotStage::kOurs) return false;
+  if (pilot) {
+    sut.fake().pilot_takes(Mode::kHold);
+    sut.run(0.3);
+  }
+  sut.aircraft().cut(true);
+  last_word();
+  sut.run(0.3);
+  sut.aircraft().cut(false);
+  return true;
+}
+
 TEST_P(CompanionContract, TerminatesWhatItLeadsAndNotWhatAPilotFlies) {
   for (const bool pilot : {false, true}) {
     const auto sut = lane();
-    sut->run(25.0);
-    ASSERT_EQ(sut->stage(), AutopilotStage::kOurs);
-    if (pilot) {
-      sut->fake().pilot_takes(Mode::kHold);
-      sut->run(0.3);
-    }
-    sut->aircraft().cut(true);
-    sut->aircraft().terminate();
-    sut->run(0.3);
-    sut->aircraft().cut(false);
+    ASSERT_TRUE(is_led_until_told(*sut, pilot, [&] { sut->aircraft().terminate(); }));
     sut->run(3.0);
     EXPECT_EQ(sut->fake().armed(), pilot);
     EXPECT_EQ(sut->truth().on_ground, !pilot);
@@ -374,16 +381,7 @@ TEST_P(CompanionContract, TerminatesWhatItLeadsAndNotWhatAPilotFlies) {
 TEST_P(CompanionContract, LandsByTheAutopilotsOwnModeOnRequest) {
   for (const bool pilot : {false, true}) {
     const auto sut = lane();
-    sut->run(25.0);
-    ASSERT_EQ(sut->stage(), AutopilotStage::kOurs);
-    if (pilot) {
-      sut->fake().pilot_takes(Mode::kHold);
-      sut->run(0.3);
-    }
-    sut->aircraft().cut(true);
-    sut->companion().land();
-    sut->run(0.3);
-    sut->aircraft().cut(false);
+    ASSERT_TRUE(is_led_until_told(*sut, pilot, [&] { sut->companion().land(); }));
     sut->run(25.0);
     EXPECT_EQ(sut->fake().mode(), pilot ? Mode::kHold : Mode::kLand) << "the pilot is not disturbed";
     EXPECT_EQ(sut->truth().on_ground, !pilot);
