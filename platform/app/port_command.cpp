@@ -17,6 +17,7 @@
 
 #include "platform/app/exit_code.hpp"
 #include "platform/app/options.hpp"
+#include "platform/app/port_bridge_command.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/stop_signal.hpp"
 #include "platform/sensor_port/port_devices.hpp"
@@ -335,6 +336,8 @@ void add_port_command(CLI::App& app, std::function<int()>& run) {
   check_app->callback([options, &run] {
     run = [options] { return check_ports(options->names, options->check_s, options->json); };
   });
+
+  add_port_bridge_commands(*port_app, run);
 }
 
 }  // namespace roborun::app

@@ -62,7 +62,11 @@ class PortWriter {
   /// False: larger than the port was made for, or not open. Neither waits nor calls the system.
   template <typename Sample>
   bool write(const Sample& sample, std::span<const std::byte> payload = {}) noexcept {
-    return is_open() && roborun_port_write(&writer_, &sample, payload.data(),
+    return write_bytes(std::as_bytes(std::span(&sample, 1)), payload);
+  }
+  /// The same. Precondition: `sample` has the bytes of the kind's struct.
+  bool write_bytes(std::span<const std::byte> sample, std::span<const std::byte> payload) noexcept {
+    return is_open() && roborun_port_write(&writer_, sample.data(), payload.data(),
                                            static_cast<std::uint32_t>(payload.size_bytes())) == 0;
   }
 

@@ -7,13 +7,14 @@ shift 2
 folder=$(mktemp -d)
 . "$(dirname "$0")/flight_checks.sh"
 name=$(basename "$folder")
-plant= run= feeder=
-trap 'kill -9 $plant $run $feeder 2>/dev/null; rm -rf "$folder" /dev/shm/roborun-$name-*' EXIT
+plant= run= feeder= bridge=
+trap 'kill -9 $plant $run $feeder $bridge 2>/dev/null; rm -rf "$folder" /dev/shm/roborun-$name-*' EXIT
 
 link="port:$name"
+elsewhere=
 start() {  # OPTION_OF_PLANT..: both, in a world of 60 m
   rm -f "$folder"/*.json
-  "$roborun" plant --world "$root/tests/data/worlds/two_pillars.toml" --port "$name" --seconds 240 --json "$@" \
+  $elsewhere "$roborun" plant --world "$root/tests/data/worlds/two_pillars.toml" --port "$name" --seconds 240 --json "$@" \
     >"$folder/plant.json" 2>"$folder/plant.err" &
   plant=$!
   "$roborun" run --vehicle paper --link "$link" --goal 60,0,4 --bounds -10,-15,1.5,70,15,8 --profile paper \
@@ -120,9 +121,46 @@ lands_without_a_feeder() {
   kill -KILL $feeder
   ends 1 $run && ends 0 $plant && is holding run reason && is landed run ended && is False plant collided && is landed plant reason
 }
+# Plant and runtime as on two machines: a network of 2 to 3 ms between them that loses 2 % of all datagrams, and, where the kernel has namespaces of time,
+# clocks that are 1,000 s apart.
+bridge() {
+  local port=$((20000 + $$ % 10000))
+  unbridge
+  rm -f /dev/shm/roborun-$name-*
+  unshare --time --monotonic 1000 --fork true 2>/dev/null && elsewhere="unshare --time --monotonic 1000 --fork --kill-child"
+  $elsewhere "$roborun" port share "$name" --link "udpin://127.0.0.1:$port" 2>"$folder/share.log" &
+  bridge=$!
+  python3 "$root/tests/platform/sensor_port/relay.py" $((port + 1)) $port 2 0.02 &
+  relay=$!
+  "$roborun" port fetch "$name-far" --link "udpout://127.0.0.1:$((port + 1))" 2>"$folder/fetch.log" &
+  bridge="$bridge $relay $!"
+}
+unbridge() {
+  kill -9 $bridge 2>/dev/null
+  wait $bridge 2>/dev/null
+  bridge=
+}
+reaches_the_goal_from_another_machine() {
+  local link="port:$name-far" elsewhere
+  bridge
+  start
+  ends 0 $run && ends 0 $plant && is True run reached_goal && is landed run ended && is True plant reached_goal &&
+    is False plant collided && is landed plant reason && is 0 run heap_calls_after_start && unbridge
+}
+# The cable is pulled: each side is as if the other one had died.
+switches_off_without_the_other_machine() {
+  local link="port:$name-far" elsewhere
+  bridge
+  start
+  flown 9
+  kill -9 $relay
+  ends 1 $run && is terminated run reason && is "motors off" run ended && is False run reached_goal && ends 1 $plant &&
+    is collision plant reason && unbridge
+}
 
 [[ $# -gt 0 ]] || set -- reaches_the_goal flies_over_the_bus switches_off_without_a_bus lands_on_a_signal switches_off_without_a_plant \
-  switches_off_when_the_plant_stops falls_without_a_runtime plant_ends_on_a_signal goes_on_with_a_new_feeder lands_without_a_feeder
+  switches_off_when_the_plant_stops falls_without_a_runtime plant_ends_on_a_signal goes_on_with_a_new_feeder lands_without_a_feeder \
+  reaches_the_goal_from_another_machine switches_off_without_the_other_machine
 failed=0
 for flight in "$@"; do
   tries $flight $flight || failed=$((failed + 1))
