@@ -15,6 +15,7 @@
 #include "firmware_if/dronecan/node.hpp"
 #include "platform/app/exit_code.hpp"
 #include "platform/app/input_lines.hpp"
+#include "platform/app/machine_clock.hpp"
 #include "platform/app/options.hpp"
 #include "platform/can/candump.hpp"
 #include "platform/can/message_json.hpp"
@@ -227,11 +228,6 @@ int encode(const std::string& path) {
   return kDone;
 }
 
-MonotonicTime now() {
-  return MonotonicTime{
-      std::chrono::duration_cast<Nanos>(std::chrono::steady_clock::now().time_since_epoch())};
-}
-
 void open_or_refuse(can::SocketCan& bus, const std::string& interface) {
   if (const std::string why = bus.open(interface); !why.empty()) throw InputError(why);
 }
@@ -241,9 +237,9 @@ int monitor(const std::string& interface, bool json, double duration_s) {
   open_or_refuse(bus, interface);
   Decoder decoder("roborun can monitor: ", json);
   can::LogLine line{.interface = interface, .frame = {}, .data_frame = true};
-  const MonotonicTime end = now() + from_seconds(duration_s);
+  const MonotonicTime end = monotonic_now() + from_seconds(duration_s);
   const input::StopOnSignal stop;
-  while (now() < end && !input::StopOnSignal::requested()) {
+  while (monotonic_now() < end && !input::StopOnSignal::requested()) {
     const Status status = bus.receive(line.frame);
     if (status == Status::kOk) {
       decoder.take(line, fmt::format("{:.6f}", seconds(line.frame.stamp.time_since_epoch())));
@@ -280,8 +276,8 @@ int send_esc(const std::string& interface, bool props_off, int count, std::optio
   std::vector<double> thrust(static_cast<std::size_t>(count), motor ? 0.0 : throttle_ratio);
   if (motor) thrust.at(static_cast<std::size_t>(*motor)) = throttle_ratio;
   const auto run_for = [&](double s) {
-    for (const MonotonicTime end = now() + from_seconds(s); now() < end;) {
-      const MonotonicTime t = now();
+    for (const MonotonicTime end = monotonic_now() + from_seconds(s); monotonic_now() < end;) {
+      const MonotonicTime t = monotonic_now();
       gate.beat(t);
       (void)node.step(t, {.cycle_ok = true, .armed = true, .thrust_ratio = thrust});
       std::this_thread::sleep_for(std::chrono::microseconds{2500});

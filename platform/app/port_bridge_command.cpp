@@ -5,7 +5,6 @@
 #include <pthread.h>
 
 #include <array>
-#include <chrono>
 #include <cstdio>
 #include <ctime>
 #include <limits>
@@ -14,6 +13,7 @@
 #include <string>
 
 #include "platform/app/exit_code.hpp"
+#include "platform/app/machine_clock.hpp"
 #include "platform/app/options.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/stop_signal.hpp"
@@ -30,9 +30,6 @@ struct BridgeOptions {
   double seconds{std::numeric_limits<double>::infinity()};
   bool json{false};
 };
-
-/// Of this machine: stamps are on it.
-MonotonicTime monotonic_now() { return MonotonicTime{std::chrono::steady_clock::now().time_since_epoch()}; }
 
 /// Where the kernel allows it: a flight waits for what comes through here.
 void take_real_time() {

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "platform/app/exit_code.hpp"
+#include "platform/app/machine_clock.hpp"
 #include "platform/app/options.hpp"
 #include "platform/app/port_bridge_command.hpp"
 #include "platform/input/input_error.hpp"
@@ -31,8 +32,6 @@ namespace sp = sensor_port;
 using Json = nlohmann::ordered_json;
 
 using sp::is_written_to, sp::kPortFolder, sp::kPortPrefix, sp::port_path;
-
-MonotonicTime monotonic_now() { return MonotonicTime{std::chrono::steady_clock::now().time_since_epoch()}; }
 
 /// A port, read as the runtime reads it, and what was in its newest sample.
 class PortProbe {

@@ -77,6 +77,15 @@ static_assert(sizeof(BridgeHeader) + sizeof(BridgeHello) + kMostStreams * sizeof
 /// Bytes of a picture in each piece but the last.
 inline constexpr std::size_t kPiece_bytes = 1344;
 static_assert(sizeof(BridgeHeader) + sizeof(BridgePiece) + kPiece_bytes <= kDatagram_bytes);
+/// How many pieces a picture of so many bytes has.
+[[nodiscard]] constexpr std::size_t pieces_of(std::size_t bytes) noexcept {
+  return (bytes + kPiece_bytes - 1) / kPiece_bytes;
+}
+
+/// A stamp on another clock. What a writer says may be anything: it wraps around.
+[[nodiscard]] constexpr std::int64_t moved_ns(std::int64_t stamp_ns, std::int64_t by_ns) noexcept {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(stamp_ns) + static_cast<std::uint64_t>(by_ns));
+}
 
 using SendDatagram = std::function<void(std::span<const std::uint8_t>)>;
 

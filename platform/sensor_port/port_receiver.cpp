@@ -77,9 +77,9 @@ void PortReceiver::write(Stream& stream, std::span<std::byte> sample, std::span<
                          Nanos shift) {
   roborun_port_stamp stamp;
   std::memcpy(&stamp, sample.data(), sizeof stamp);
-  const auto sum = static_cast<std::uint64_t>(stamp.stamp_ns) + static_cast<std::uint64_t>(shift.count());
-  stamp.stamp_ns = static_cast<std::int64_t>(sum);
-  const std::uint64_t back_ns = static_cast<std::uint64_t>(stream.stamp_ns) - sum;
+  stamp.stamp_ns = moved_ns(stamp.stamp_ns, shift.count());
+  const auto back_ns =
+      static_cast<std::uint64_t>(stream.stamp_ns) - static_cast<std::uint64_t>(stamp.stamp_ns);
   if (back_ns < static_cast<std::uint64_t>(kStands_ns)) stamp.stamp_ns = stream.stamp_ns;
   stream.stamp_ns = stamp.stamp_ns;
   std::memcpy(sample.data(), &stamp, sizeof stamp);
@@ -113,7 +113,6 @@ void PortReceiver::begin(Stream& stream, const BridgePiece& piece) {
   stream.held.resize(piece.picture_bytes);
   std::fill_n(stream.has.begin(), pieces, false);
   stream.missing = pieces;
-  stream.seen = 0;
 }
 
 void PortReceiver::piece(MonotonicTime now, std::span<const std::uint8_t> message, Nanos shift) {
@@ -137,7 +136,6 @@ void PortReceiver::piece(MonotonicTime now, std::span<const std::uint8_t> messag
   stream->heard = now;
   if (stream->missing == 0 || stream->has[piece.index]) return;
   stream->has[piece.index] = true;
-  stream->seen = std::max<std::size_t>(stream->seen, piece.index + 1);
   std::memcpy(stream->held.data() + at, message.data(), message.size());
   if (--stream->missing > 0) return;
   const std::span<std::byte> picture(stream->held);

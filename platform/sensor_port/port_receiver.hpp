@@ -50,7 +50,6 @@ class PortReceiver {
     std::vector<std::byte> held;  ///< The picture that is coming.
     std::vector<bool> has;        ///< Which pieces of it.
     std::size_t missing{0};
-    std::size_t seen{0};  ///< Pieces up to the last one that came.
     MonotonicTime heard{}, asked{};
   };
   void open(Stream& stream, const BridgeStream& told);

@@ -26,10 +26,7 @@ void append(const PortSample& port, Nanos shift, std::vector<std::byte>& out) {
   out.insert(out.end(), port.payload.begin(), port.payload.end());
   roborun_port_stamp stamp;
   std::memcpy(&stamp, out.data() + at, sizeof stamp);
-  // What a writer says may be anything: no overflow.
-  stamp.stamp_ns = static_cast<std::int64_t>(static_cast<std::uint64_t>(stamp.stamp_ns) +
-                                             static_cast<std::uint64_t>(port.clock_offset_ns) +
-                                             static_cast<std::uint64_t>(shift.count()));
+  stamp.stamp_ns = moved_ns(moved_ns(stamp.stamp_ns, port.clock_offset_ns), shift.count());
   std::memcpy(out.data() + at, &stamp, sizeof stamp);
 }
 

@@ -66,10 +66,6 @@ class PortSender {
 
 /// Images and clouds: their samples have a payload, and the newest counts.
 [[nodiscard]] bool is_picture(std::uint32_t kind) noexcept;
-/// How many pieces a picture of so many bytes has.
-[[nodiscard]] constexpr std::size_t pieces_of(std::size_t bytes) noexcept {
-  return (bytes + kPiece_bytes - 1) / kPiece_bytes;
-}
 /// Letters, digits and dashes, at most 23 of them.
 [[nodiscard]] bool is_suffix(std::string_view suffix) noexcept;
 

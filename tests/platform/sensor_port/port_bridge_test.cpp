@@ -82,6 +82,13 @@ class PortBridgeTest : public ::testing::Test {
     run_for(Nanos{2'000'000'000});
     ASSERT_TRUE(fetch_->is_heard(far_clock()) && fetch_->is_matched());
   }
+  /// A port that is written on one machine, and read on the other one.
+  void connect(const std::string& suffix, std::uint32_t kind, std::size_t most_bytes, PortWriter& port,
+               PortReader& reader, bool to_far = true) {
+    ASSERT_EQ(port.open((to_far ? here_ : there_) + suffix, kind, most_bytes, most_bytes > 0 ? 4 : 1024), "");
+    meet();
+    ASSERT_EQ(reader.open((to_far ? there_ : here_) + suffix, kind), "");
+  }
   [[nodiscard]] double chance() { return std::uniform_real_distribution<double>{}(random_); }
 
   void write_imu(PortWriter& port, std::uint32_t sequence) const {
@@ -137,10 +144,8 @@ TEST_F(PortBridgeTest, MakesThePortsOfTheOtherMachineAndNotItsTruth) {
 TEST_F(PortBridgeTest, LosesNoSampleOfAnImuWhereEveryFifthDatagramIsLost) {
   network_ = {0.2, 0.05, Nanos{1'500'000}, Nanos{2'000'000}};
   PortWriter imu;
-  ASSERT_EQ(imu.open(here_ + "-imu", ROBORUN_PORT_IMU, 0, 1024), "");
-  meet();
   PortReader reader;
-  ASSERT_EQ(reader.open(there_ + "-imu", ROBORUN_PORT_IMU), "");
+  connect("-imu", ROBORUN_PORT_IMU, 0, imu, reader);
   std::uint32_t sequence = 0, got = 0;
   std::int64_t before_ns = 0;
   Nanos written{0};
@@ -170,11 +175,9 @@ TEST_F(PortBridgeTest, LosesNoSampleOfAnImuWhereEveryFifthDatagramIsLost) {
 TEST_F(PortBridgeTest, StampsAreOnTheReadersClockWithinWhatItSays) {
   network_ = {0.0, 0.0, Nanos{1'000'000}, Nanos{1'000'000}};
   PortWriter imu;
-  ASSERT_EQ(imu.open(here_ + "-imu", ROBORUN_PORT_IMU, 0, 1024), "");
-  meet();
-  run_for(Nanos{2'000'000'000});
   PortReader reader;
-  ASSERT_EQ(reader.open(there_ + "-imu", ROBORUN_PORT_IMU), "");
+  connect("-imu", ROBORUN_PORT_IMU, 0, imu, reader);
+  run_for(Nanos{2'000'000'000});
   const MonotonicTime true_stamp = far_clock();
   write_imu(imu, 1);
   run_for(Nanos{10'000'000});
@@ -188,10 +191,8 @@ TEST_F(PortBridgeTest, StampsAreOnTheReadersClockWithinWhatItSays) {
 TEST_F(PortBridgeTest, PicturesComeWholeAndInTheirOrderWhereEveryTenthDatagramIsLost) {
   network_ = {0.1, 0.05, Nanos{1'000'000}, Nanos{2'000'000}};
   PortWriter camera;
-  ASSERT_EQ(camera.open(here_ + "-camera1", ROBORUN_PORT_DEPTH, 4 * kPixels, 4), "");
-  meet();
   PortReader reader;
-  ASSERT_EQ(reader.open(there_ + "-camera1", ROBORUN_PORT_DEPTH), "");
+  connect("-camera1", ROBORUN_PORT_DEPTH, 4 * kPixels, camera, reader);
   std::uint32_t sequence = 0, before = 0, got = 0;
   Nanos written{0};
   const auto each = [&] {
@@ -220,10 +221,8 @@ TEST_F(PortBridgeTest, PicturesComeWholeAndInTheirOrderWhereEveryTenthDatagramIs
 TEST_F(PortBridgeTest, BringsTheRuntimesFramesBackOnThePlantsClock) {
   network_ = {0.1, 0.0, Nanos{1'000'000}, Nanos{500'000}};
   PortWriter out;
-  ASSERT_EQ(out.open(there_ + "-bus-out", ROBORUN_PORT_CAN, 0, 1024), "");
-  meet();
   PortReader reader;
-  ASSERT_EQ(reader.open(here_ + "-bus-out", ROBORUN_PORT_CAN), "");
+  connect("-bus-out", ROBORUN_PORT_CAN, 0, out, reader, false);
   std::uint32_t sent = 0, got = 0;
   run_for(Nanos{5'000'000'000}, [&] {
     for (int i = 0; i < 3; ++i) {
@@ -279,10 +278,8 @@ TEST_F(PortBridgeTest, GoesOnWithAnotherPlantAnotherFormatAndAnotherShare) {
 
 TEST_F(PortBridgeTest, FollowsAClockThatIsSet) {
   PortWriter imu;
-  ASSERT_EQ(imu.open(here_ + "-imu", ROBORUN_PORT_IMU, 0, 1024), "");
-  meet();
   PortReader reader;
-  ASSERT_EQ(reader.open(there_ + "-imu", ROBORUN_PORT_IMU), "");
+  connect("-imu", ROBORUN_PORT_IMU, 0, imu, reader);
   apart_ += Nanos{3'600'000'000'000};  // as after a pause of the other machine
   run_for(Nanos{2'000'000'000});
   const MonotonicTime true_stamp = far_clock();
