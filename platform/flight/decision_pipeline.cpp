@@ -18,7 +18,6 @@ constexpr std::size_t kTrajectoryPoints = 32;
 constexpr double kCornerRoom_m = 0.25;
 constexpr double kAtRest_mps = 0.05;
 constexpr double kAtGoal_m = 0.3;
-constexpr double kLeaving_mps = 0.5;
 constexpr double kTooFast = 1.5;
 constexpr double kForgets = 0.9;      // what the planner took, from one decision to the next
 constexpr double kSlowEnough = 1.05;  // of the slow speed: what trajectories keep to
@@ -307,23 +306,6 @@ void DecisionPipeline::fit(core::StageBudget& budget, double radius_m, double sp
   }
 }
 
-void DecisionPipeline::leave(double room_m, core::StageBudget& budget, DecisionOutput& out) noexcept {
-  // What is flown ends in a stop: from there.
-  if (draft_.start.v_W.norm() > kAtRest_mps || draft_.start.a_W.norm() > kAtRest_mps) return;
-  const Permitted permitted(*this);
-  stages::WayOutRequest request;
-  request.start_W = draft_.start.p_W;
-  request.start_time = draft_.takes_over;
-  request.bounds_W = config_.flight_bounds_W;
-  request.limits = limits(std::min(out.decision.point.speed_limit_mps, kLeaving_mps));
-  request.body_m = config_.vehicle.radius_m;
-  request.room_m = room_m;
-  meter_.charge_to(core::StageId::kSmoother);
-  draft_.leaves = stages::find_way_out(request, permitted.view(), stages::FinestView(permitted.view()),
-                                       budget, draft_.smoother_work, draft_.trajectory);
-  out.smoother_status = draft_.leaves ? Status::kOk : Status::kNoPath;
-}
-
 void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexcept {
   draft_.begun = false;
   hasten(in, out);
@@ -450,7 +432,10 @@ void DecisionPipeline::choose(const DecisionInput& in, DecisionOutput& out) noex
   if (has_new && !keeps && !(is_free && draft_.keeps)) {
     has_planned_ = true;
     is_narrow_ = draft_.is_narrow;
-    if (draft_.leaves) leaves_at_ = draft_.trajectory.start_time;
+    if (draft_.leaves) {
+      leaves_at_ = draft_.trajectory.start_time;
+      left_W_ = draft_.start.p_W;
+    }
     if (draft_.dodges) dodges_at_ = draft_.trajectory.start_time;
     out.kind = DecisionKind::kNew;
     out.trajectory = draft_.trajectory;
@@ -475,6 +460,7 @@ void DecisionPipeline::forget() noexcept {
   viewpoints_ = {};
   kept_W_.clear();
   look_W_.reset();
+  left_W_.reset();
   has_planned_ = false;
 }
 

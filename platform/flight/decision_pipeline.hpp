@@ -227,7 +227,8 @@ class DecisionPipeline {
   BodyTracks bodies_;
   bool has_planned_{false};  ///< A plan was found since the take-off.
   MonotonicTime leaves_at_ =
-      MonotonicTime::min();  ///< Start of the last trajectory that leaves a place without room.
+      MonotonicTime::min();          ///< Start of the last trajectory that leaves a place without room.
+  std::optional<Vector3> left_W_{};  ///< Where that began.
   MonotonicTime dodges_at_ = MonotonicTime::min();  ///< The same of the last one that goes aside.
   Draft draft_;
   std::array<double, kPrecisionLevels> searched_s_{};  ///< By level of p1: what the planner took lately.

@@ -1,7 +1,12 @@
-// Stops: where an autopilot's leads when the vehicle hears no commands any more, and how soon a vehicle that stands decides.
+// Stops: where an autopilot's leads when the vehicle hears no commands any more, how soon a vehicle that stands decides, and how it
+// leaves a place without room.
 #include <algorithm>
 
 #include "platform/flight/decision_pipeline.hpp"
+#include "platform/flight/flight_config.hpp"
+#include "stages/perception/swept_ball.hpp"
+#include "stages/planning/fenced_view.hpp"
+#include "stages/planning/way_out.hpp"
 
 namespace roborun::flight {
 
@@ -42,6 +47,33 @@ void DecisionPipeline::hasten(const DecisionInput& in, DecisionOutput& out) cons
   const MonotonicTime stands = in.committed->start_time + from_seconds(in.committed->duration_s());
   if (in.now + whole < stands) return;
   out.decision.point.deadline = std::min(out.decision.point.deadline, whole);
+}
+
+void DecisionPipeline::leave(double room_m, core::StageBudget& budget, DecisionOutput& out) noexcept {
+  constexpr double kAtRest_mps = 0.05;  // of what is flown, and m/s2
+  constexpr double kLeaving_mps = 0.5;
+  constexpr double kSamePlace_m = 2.0;  // as far as a way out leads
+  constexpr int kTriesFiner = 4;        // failures: the governor asks for finer cells meanwhile
+  // What is flown ends in a stop: from there.
+  if (draft_.start.v_W.norm() > kAtRest_mps || draft_.start.a_W.norm() > kAtRest_mps) return;
+  const stages::FencedView permitted(map_.view(), config_.fence);
+  const stages::FinestView finest(permitted);
+  // Where it stands again though it left, and only the cells are too coarse for the room that there is, finer ones are what lacks.
+  const bool again = left_W_ && (draft_.start.p_W - *left_W_).norm() < kSamePlace_m;
+  if (again && failures_ < kTriesFiner &&
+      stages::is_ball_free(finest, draft_.start.p_W, room_m, draft_.smoother_work.units))
+    return;
+  stages::WayOutRequest request;
+  request.start_W = draft_.start.p_W;
+  request.start_time = draft_.takes_over;
+  request.bounds_W = config_.flight_bounds_W;
+  request.limits = limits(std::min(out.decision.point.speed_limit_mps, kLeaving_mps));
+  request.body_m = config_.vehicle.radius_m;
+  request.room_m = room_m;
+  meter_.charge_to(core::StageId::kSmoother);
+  draft_.leaves =
+      stages::find_way_out(request, permitted, finest, budget, draft_.smoother_work, draft_.trajectory);
+  out.smoother_status = draft_.leaves ? Status::kOk : Status::kNoPath;
 }
 
 }  // namespace roborun::flight
