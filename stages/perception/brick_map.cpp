@@ -27,11 +27,15 @@ Vector3 corner_of(const BrickMap::Config& config) noexcept {
   return corner;
 }
 
-std::size_t position_count(const BrickMap::Config& config) noexcept {
+std::size_t row_count(const BrickMap::Config& config) noexcept {
   const Vector3 size = config.bounds_W.max_W - corner_of(config);
-  return static_cast<std::size_t>(even_bricks(config, size.x())) *
-         static_cast<std::size_t>(even_bricks(config, size.y())) *
+  return static_cast<std::size_t>(even_bricks(config, size.y())) *
          static_cast<std::size_t>(even_bricks(config, size.z()));
+}
+
+std::size_t position_count(const BrickMap::Config& config) noexcept {
+  const double length_m = config.bounds_W.max_W.x() - corner_of(config).x();
+  return static_cast<std::size_t>(even_bricks(config, length_m)) * row_count(config);
 }
 
 }  // namespace
@@ -54,7 +58,7 @@ Status BrickMap::Config::validate() const noexcept {
 
 std::size_t BrickMap::arena_bytes(const Config& config) noexcept {
   const std::size_t positions = position_count(config);
-  return positions * (2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
+  return positions * (2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) + row_count(config) * sizeof(Reach) +
          config.max_bricks * (sizeof(Brick) + 2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
          config.max_frames * DepthPyramid::arena_bytes(config.max_image_width, config.max_image_height) +
          config.max_image_width * config.max_image_height * sizeof(float) + 16 * alignof(std::max_align_t);
@@ -75,6 +79,8 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
   order_pool_ = &arena.last_pool();
   order_key_ = arena.take<std::uint16_t>(positions, "map order keys");
   arena.last_pool().use(order_key_.size());
+  row_reach_ = arena.take<Reach>(row_count(config), "map rows");
+  arena.last_pool().use(row_reach_.size());
   brick_ = arena.take<Brick>(config.max_bricks, "map bricks");
   brick_pool_ = &arena.last_pool();
   free_list_ = arena.take<std::uint32_t>(config.max_bricks, "map free list");
@@ -105,6 +111,7 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
 
 void BrickMap::forget() noexcept {
   std::fill(slot_.begin(), slot_.end(), kUnknownBrick);
+  std::fill(row_reach_.begin(), row_reach_.end(), Reach{nx_, -1});
   // Highest slot first, so that slots are handed out from 0 up.
   for (std::size_t i = 0; i < free_list_.size(); ++i) {
     free_list_[i] = static_cast<std::uint32_t>(free_list_.size() - 1 - i);
@@ -146,6 +153,7 @@ Brick* BrickMap::touch(std::int32_t bx, std::int32_t by, std::int32_t bz) noexce
       return nullptr;
     }
     slot = static_cast<std::int32_t>(free_list_[--free_count_]);
+    reach_to(bx, by, bz);
     brick_pool_->use(brick_.size() - free_count_);
     known_pool_->use(brick_.size() - free_count_);
     Brick& fresh = brick_[static_cast<std::size_t>(slot)];
@@ -171,6 +179,7 @@ void BrickMap::free_brick(std::int32_t bx, std::int32_t by, std::int32_t bz) noe
   if (slot < 0) {
     if (slot > kFreeBrick) known_cells_ += kCellsPerBrick;
     slot = free_now_;
+    reach_to(bx, by, bz);
   } else if (Brick* brick = touch(bx, by, bz)) {
     brick->add_free(kBrickLevel, 0, 1U, {false, counts_for_the_thin(bx, by, bz)});
     brick->cleared = free_now_;

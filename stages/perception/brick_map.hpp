@@ -10,6 +10,7 @@
 /// erases a surface seen in the same scan.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -216,10 +217,17 @@ class BrickMap final : public OccupancyMap, private MapView {
     Cell low, high;
     [[nodiscard]] bool operator==(const Box&) const noexcept = default;
   };
+  struct Reach {
+    std::int32_t first, last;
+  };
+  void reach_to(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept {
+    Reach& row = row_reach_[static_cast<std::size_t>(bz * ny_ + by)];
+    row = {std::min(row.first, bx), std::max(row.last, bx)};
+  }
   static constexpr std::size_t kDistances = 512;
   static constexpr double kDistance_m = 2.4;
   using KnownByDistance = std::array<std::uint64_t, kDistances>;  ///< Cells.
-  /// Adds what is known in `box`, but not in `done`, which lies in it. Counts the positions on. False: budget spent.
+  /// Adds what is known in `box`, but not in `done`, which lies in it. Counts the rows and positions on. False: budget spent.
   [[nodiscard]] bool count_known(const Box& box, const Box& done, std::size_t& positions,
                                  KnownByDistance& known, core::StageBudget& budget,
                                  core::Work& work) const noexcept;
@@ -240,6 +248,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   std::int32_t nx_, ny_, nz_;     ///< Bricks, even numbers.
   Cell low_, high_;               ///< Cells of the bounds.
   std::span<std::int32_t> slot_;  ///< Brick of each position, or what is known without one.
+  std::span<Reach>
+      row_reach_;  ///< Of each row of positions along x: beyond it nothing was ever known. By [z][y].
   std::span<Brick> brick_;
   core::PoolRecord* brick_pool_{nullptr};
   core::PoolRecord* order_pool_{nullptr};

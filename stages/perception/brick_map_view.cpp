@@ -8,16 +8,20 @@ namespace roborun::stages {
 
 bool BrickMap::count_known(const Box& box, const Box& done, std::size_t& positions, KnownByDistance& known,
                            core::StageBudget& budget, core::Work& work) const noexcept {
+  const auto is_late = [&] { return ++positions % 1024 == 0 && budget.spent(work); };
   for (std::int32_t bz = box.low.z; bz <= box.high.z; ++bz) {
     for (std::int32_t by = box.low.y; by <= box.high.y; ++by) {
       const std::int32_t* const row = &slot_[slot_of(0, by, bz)];
       const bool crosses = bz >= done.low.z && bz <= done.high.z && by >= done.low.y && by <= done.high.y;
-      for (std::int32_t bx = box.low.x; bx <= box.high.x; ++bx) {
-        if (crosses && bx == done.low.x) {
+      if (is_late()) return false;
+      const Reach reach = row_reach_[static_cast<std::size_t>(bz * ny_ + by)];
+      const std::int32_t last = std::min(box.high.x, reach.last);
+      for (std::int32_t bx = std::max(box.low.x, reach.first); bx <= last; ++bx) {
+        if (crosses && bx >= done.low.x && bx <= done.high.x) {
           bx = done.high.x;
           continue;
         }
-        if (++positions % 1024 == 0 && budget.spent(work)) return false;
+        if (is_late()) return false;
         const std::int32_t slot = row[bx];
         if (slot == kUnknownBrick || slot == kSurfaceBrick) continue;
         const std::size_t count =

@@ -190,7 +190,8 @@ TEST(SixCamerasWithHoles, LookCloselyWhereLeavingDidNotHelp) {
     MissionConfig config = with_holes();
     config.seed = seed;
     const report::MissionResult r = fly_mission(environment_14(seed), config, {}).result;
-    std::printf("seed %u: %s after %.0f s\n", static_cast<unsigned>(seed), r.reason.c_str(), r.mission_time_s);
+    std::printf("seed %u: %s after %.0f s\n", static_cast<unsigned>(seed), r.reason.c_str(),
+                r.mission_time_s);
     EXPECT_TRUE(r.reached_goal) << r.reason;
     EXPECT_FALSE(r.collided);
   }
