@@ -338,9 +338,11 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
     out.planner_status = out.smoother_status = Status::kOk;
     return;
   }
-  // Searches that find nothing may take all the time that there is: every other one begins with the narrow room.
+  // Searches that find nothing may take all time and volume that there are: every other one begins with the least room.
+  const double slow_m = slow_radius_m(config_.vehicle);
   draft_.is_narrow = failures_ % 2 == 1 && may_squeeze();
-  search(in, draft_.is_narrow ? slow_radius_m(config_.vehicle) : radius_m() + kCornerRoom_m, out);
+  const bool is_tight = draft_.is_narrow || (failures_ % 2 == 1 && slow_m >= radius_m());
+  search(in, is_tight ? std::min(slow_m, radius_m()) : radius_m() + kCornerRoom_m, out);
 }
 
 void DecisionPipeline::remember(const DecisionInput& in, DecisionOutput& out) noexcept {
