@@ -204,10 +204,11 @@ class BrickMap final : public OccupancyMap, private MapView {
   /// IntegrationRequest::assumed_half_m.
   void assume_free(const Vector3& half_m) noexcept;
   [[nodiscard]] bool cell_of(const Vector3& p_W, Cell& cell) const noexcept;
+  [[nodiscard]] std::size_t row_of(std::int32_t by, std::int32_t bz) const noexcept {
+    return static_cast<std::size_t>(bz) * static_cast<std::size_t>(ny_) + static_cast<std::size_t>(by);
+  }
   [[nodiscard]] std::size_t slot_of(std::int32_t bx, std::int32_t by, std::int32_t bz) const noexcept {
-    return (static_cast<std::size_t>(bz) * static_cast<std::size_t>(ny_) + static_cast<std::size_t>(by)) *
-               static_cast<std::size_t>(nx_) +
-           static_cast<std::size_t>(bx);
+    return row_of(by, bz) * static_cast<std::size_t>(nx_) + static_cast<std::size_t>(bx);
   }
   /// No deeper than to cells of `level`; bricks farther than `radius_m` from view_center_W_ are unknown.
   [[nodiscard]] bool box_free(const Aabb& box_W, int level, double radius_m,
@@ -217,11 +218,12 @@ class BrickMap final : public OccupancyMap, private MapView {
     Cell low, high;
     [[nodiscard]] bool operator==(const Box&) const noexcept = default;
   };
+  /// Of a row of positions: the first and the last that was ever known.
   struct Reach {
     std::int32_t first, last;
   };
   void reach_to(std::int32_t bx, std::int32_t by, std::int32_t bz) noexcept {
-    Reach& row = row_reach_[static_cast<std::size_t>(bz * ny_ + by)];
+    Reach& row = row_reach_[row_of(by, bz)];
     row = {std::min(row.first, bx), std::max(row.last, bx)};
   }
   static constexpr std::size_t kDistances = 512;
@@ -248,8 +250,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   std::int32_t nx_, ny_, nz_;     ///< Bricks, even numbers.
   Cell low_, high_;               ///< Cells of the bounds.
   std::span<std::int32_t> slot_;  ///< Brick of each position, or what is known without one.
-  std::span<Reach>
-      row_reach_;  ///< Of each row of positions along x: beyond it nothing was ever known. By [z][y].
+  std::span<Reach> row_reach_;    ///< By row_of().
   std::span<Brick> brick_;
   core::PoolRecord* brick_pool_{nullptr};
   core::PoolRecord* order_pool_{nullptr};

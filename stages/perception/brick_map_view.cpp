@@ -14,7 +14,7 @@ bool BrickMap::count_known(const Box& box, const Box& done, std::size_t& positio
       const std::int32_t* const row = &slot_[slot_of(0, by, bz)];
       const bool crosses = bz >= done.low.z && bz <= done.high.z && by >= done.low.y && by <= done.high.y;
       if (is_late()) return false;
-      const Reach reach = row_reach_[static_cast<std::size_t>(bz * ny_ + by)];
+      const Reach reach = row_reach_[row_of(by, bz)];
       const std::int32_t last = std::min(box.high.x, reach.last);
       for (std::int32_t bx = std::max(box.low.x, reach.first); bx <= last; ++bx) {
         if (crosses && bx >= done.low.x && bx <= done.high.x) {
