@@ -15,7 +15,6 @@
 #include "firmware_if/dronecan/node.hpp"
 #include "platform/app/exit_code.hpp"
 #include "platform/app/input_lines.hpp"
-#include "platform/app/machine_clock.hpp"
 #include "platform/app/options.hpp"
 #include "platform/can/candump.hpp"
 #include "platform/can/message_json.hpp"
@@ -23,6 +22,7 @@
 #include "platform/input/input_error.hpp"
 #include "platform/input/json_reader.hpp"
 #include "platform/input/stop_signal.hpp"
+#include "platform/rt/monotonic_clock.hpp"
 
 namespace roborun::app {
 namespace {
@@ -237,9 +237,9 @@ int monitor(const std::string& interface, bool json, double duration_s) {
   open_or_refuse(bus, interface);
   Decoder decoder("roborun can monitor: ", json);
   can::LogLine line{.interface = interface, .frame = {}, .data_frame = true};
-  const MonotonicTime end = monotonic_now() + from_seconds(duration_s);
+  const MonotonicTime end = rt::monotonic_now() + from_seconds(duration_s);
   const input::StopOnSignal stop;
-  while (monotonic_now() < end && !input::StopOnSignal::requested()) {
+  while (rt::monotonic_now() < end && !input::StopOnSignal::requested()) {
     const Status status = bus.receive(line.frame);
     if (status == Status::kOk) {
       decoder.take(line, fmt::format("{:.6f}", seconds(line.frame.stamp.time_since_epoch())));
@@ -276,8 +276,8 @@ int send_esc(const std::string& interface, bool props_off, int count, std::optio
   std::vector<double> thrust(static_cast<std::size_t>(count), motor ? 0.0 : throttle_ratio);
   if (motor) thrust.at(static_cast<std::size_t>(*motor)) = throttle_ratio;
   const auto run_for = [&](double s) {
-    for (const MonotonicTime end = monotonic_now() + from_seconds(s); monotonic_now() < end;) {
-      const MonotonicTime t = monotonic_now();
+    for (const MonotonicTime end = rt::monotonic_now() + from_seconds(s); rt::monotonic_now() < end;) {
+      const MonotonicTime t = rt::monotonic_now();
       gate.beat(t);
       (void)node.step(t, {.cycle_ok = true, .armed = true, .thrust_ratio = thrust});
       std::this_thread::sleep_for(std::chrono::microseconds{2500});

@@ -16,7 +16,6 @@
 #include "firmware_if/mavlink/flight_messages.hpp"
 #include "platform/app/exit_code.hpp"
 #include "platform/app/input_lines.hpp"
-#include "platform/app/machine_clock.hpp"
 #include "platform/app/options.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/json_reader.hpp"
@@ -27,6 +26,7 @@
 #include "platform/mavlink/link.hpp"
 #include "platform/mavlink/message_json.hpp"
 #include "platform/mavlink/signed_end.hpp"
+#include "platform/rt/monotonic_clock.hpp"
 
 namespace roborun::app {
 namespace {
@@ -141,7 +141,7 @@ void greet(mavlink::Link& link, std::uint8_t seq, mav::Signer* signer) {
   const auto length =
       mav::write_frame(mav::Heartbeat::kType, {seq, 255, 190},
                        mav::pack(mav::Heartbeat{kGroundStation, 8, 0, 0, 4, 3}), signer, bytes);
-  (void)link.write(monotonic_now(), std::span<const std::uint8_t>(bytes).first(length.value()));
+  (void)link.write(rt::monotonic_now(), std::span<const std::uint8_t>(bytes).first(length.value()));
 }
 
 int monitor(const MonitorOptions& options) {
@@ -158,14 +158,14 @@ int monitor(const MonitorOptions& options) {
   mav::Receiver receiver(verifier ? &*verifier : nullptr);
   std::map<std::uint32_t, std::size_t> unknown;
   std::array<std::uint8_t, 4096> bytes{};
-  const MonotonicTime start = monotonic_now();
+  const MonotonicTime start = rt::monotonic_now();
   MonotonicTime greeted = start - Nanos{1'000'000'000};
   std::uint8_t seq = 0;
   bool was_open = false;
   const input::StopOnSignal stop;
   for (MonotonicTime at = start;
        at < start + from_seconds(options.seconds) && !input::StopOnSignal::requested();
-       at = monotonic_now()) {
+       at = rt::monotonic_now()) {
     std::span<const std::uint8_t> came(bytes.data(), link.read(at, bytes));
     if (link.is_open() != was_open) {
       was_open = link.is_open();

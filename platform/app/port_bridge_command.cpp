@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <poll.h>
-#include <pthread.h>
 
 #include <array>
 #include <cstdio>
@@ -13,11 +12,12 @@
 #include <string>
 
 #include "platform/app/exit_code.hpp"
-#include "platform/app/machine_clock.hpp"
 #include "platform/app/options.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/stop_signal.hpp"
 #include "platform/mavlink/link.hpp"
+#include "platform/rt/lane_thread.hpp"
+#include "platform/rt/monotonic_clock.hpp"
 #include "platform/sensor_port/port_bridge.hpp"
 
 namespace roborun::app {
@@ -31,12 +31,7 @@ struct BridgeOptions {
   bool json{false};
 };
 
-/// Where the kernel allows it: a flight waits for what comes through here.
-void take_real_time() {
-  constexpr int kPriority = 30;
-  const sched_param priority{kPriority};
-  (void)pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);
-}
+constexpr int kPriority = 30;  // a flight waits for what comes through here
 
 class BridgeRun {
  public:
@@ -44,17 +39,18 @@ class BridgeRun {
       : options_(options),
         end_(end),
         link_(mavlink::parse_link(options.link)),
-        bridge_(options.name, end, static_cast<std::uint32_t>(monotonic_now().time_since_epoch().count())) {}
+        bridge_(options.name, end,
+                static_cast<std::uint32_t>(rt::monotonic_now().time_since_epoch().count())) {}
 
   int run() {
     const input::StopOnSignal stop;
-    take_real_time();
-    const MonotonicTime start = monotonic_now();
+    rt::take_priority(kPriority);
+    const MonotonicTime start = rt::monotonic_now();
     MonotonicTime said = start;
-    while (!input::StopOnSignal::requested() && seconds(monotonic_now() - start) < options_.seconds) {
+    while (!input::StopOnSignal::requested() && seconds(rt::monotonic_now() - start) < options_.seconds) {
       step();
-      if (!options_.json && monotonic_now() - said >= Nanos{1'000'000'000}) {
-        said = monotonic_now();
+      if (!options_.json && rt::monotonic_now() - said >= Nanos{1'000'000'000}) {
+        said = rt::monotonic_now();
         fmt::print(stderr, "{}\n", line());
       }
     }
@@ -66,12 +62,12 @@ class BridgeRun {
  private:
   void step() {
     const auto send = [this](std::span<const std::uint8_t> datagram) {
-      (void)link_.write(monotonic_now(), datagram);
+      (void)link_.write(rt::monotonic_now(), datagram);
     };
     std::array<std::uint8_t, 2048> bytes{};
     constexpr int kMost = 256;  // whoever floods does not keep it from sending
     for (int i = 0; i < kMost; ++i) {
-      const MonotonicTime now = monotonic_now();
+      const MonotonicTime now = rt::monotonic_now();
       const std::size_t count = link_.read(now, bytes);
       if (count == 0) break;
       bridge_.take(now, std::span(bytes).first(count), send);
@@ -79,7 +75,7 @@ class BridgeRun {
     if (!link_.is_open() && link_.why() != 0)
       throw InputError(
           fmt::format("--link: {}: {}", options_.link, std::generic_category().message(link_.why())));
-    const MonotonicTime now = monotonic_now();
+    const MonotonicTime now = rt::monotonic_now();
     bridge_.step(now, send);
     has_heard_ = has_heard_ || bridge_.is_heard(now);
     pollfd waits{link_.fd(), POLLIN, 0};
@@ -90,7 +86,7 @@ class BridgeRun {
   [[nodiscard]] std::string line() const {
     const auto& out = bridge_.sender();
     const auto& in = bridge_.receiver();
-    if (!bridge_.is_heard(monotonic_now()))
+    if (!bridge_.is_heard(rt::monotonic_now()))
       return fmt::format("{}: {}", options_.name,
                          end_ == sp::BridgeEnd::kShares ? "waits for roborun port fetch"
                                                         : "no answer: is roborun port share there?");

@@ -16,11 +16,11 @@
 #include <vector>
 
 #include "platform/app/exit_code.hpp"
-#include "platform/app/machine_clock.hpp"
 #include "platform/app/options.hpp"
 #include "platform/app/port_bridge_command.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/input/stop_signal.hpp"
+#include "platform/rt/monotonic_clock.hpp"
 #include "platform/sensor_port/port_devices.hpp"
 #include "platform/sensor_port/port_names.hpp"
 #include "platform/sensor_port/port_navigation.hpp"
@@ -163,21 +163,21 @@ struct PortSeen {
 
 PortSeen watch_for(PortProbe& probe, double duration_s) {
   PortSeen seen;
-  const MonotonicTime start = monotonic_now();
+  const MonotonicTime start = rt::monotonic_now();
   const MonotonicTime end = start + from_seconds(duration_s);
-  while (monotonic_now() < end && !input::StopOnSignal::requested()) {
+  while (rt::monotonic_now() < end && !input::StopOnSignal::requested()) {
     MonotonicTime stamp{};
     const Status status = probe.read(seen.newest, stamp);
     if (status == Status::kOk) {
       ++seen.samples;
-      seen.age_s = seconds(monotonic_now() - stamp);
+      seen.age_s = seconds(rt::monotonic_now() - stamp);
       continue;
     }
     seen.cut = status == Status::kIo;
     if (seen.cut) break;
     std::this_thread::sleep_for(std::chrono::microseconds{200});
   }
-  seen.seconds = seconds(monotonic_now() - start);
+  seen.seconds = seconds(rt::monotonic_now() - start);
   return seen;
 }
 

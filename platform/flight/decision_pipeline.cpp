@@ -16,7 +16,6 @@ namespace {
 constexpr double kTrajectoryStep_s = 0.5;  // of the points that order the space by distance
 constexpr std::size_t kTrajectoryPoints = 32;
 constexpr double kCornerRoom_m = 0.25;
-constexpr double kAtRest_mps = 0.05;
 constexpr double kAtGoal_m = 0.3;
 constexpr double kTooFast = 1.5;
 constexpr double kForgets = 0.9;      // what the planner took, from one decision to the next
@@ -339,10 +338,11 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
     return;
   }
   // Searches that find nothing may take all time and volume that there are: every other one begins with the least room.
-  const double slow_m = slow_radius_m(config_.vehicle);
-  draft_.is_narrow = failures_ % 2 == 1 && may_squeeze();
-  const bool is_tight = draft_.is_narrow || (failures_ % 2 == 1 && slow_m >= radius_m());
-  search(in, is_tight ? std::min(slow_m, radius_m()) : radius_m() + kCornerRoom_m, out);
+  const double least_m = std::min(slow_radius_m(config_.vehicle), radius_m());
+  const bool has_narrower = least_m < radius_m();
+  const bool tries_least = failures_ % 2 == 1 && (may_squeeze() || !has_narrower);
+  draft_.is_narrow = tries_least && has_narrower;
+  search(in, tries_least ? least_m : radius_m() + kCornerRoom_m, out);
 }
 
 void DecisionPipeline::remember(const DecisionInput& in, DecisionOutput& out) noexcept {

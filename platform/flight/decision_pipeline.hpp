@@ -213,6 +213,9 @@ class DecisionPipeline {
   /// For the stages that the governor does not shape: the frame table's.
   [[nodiscard]] core::MeteredBudget table_budget_of(core::StageId id) noexcept;
 
+  static constexpr double kAtRest_mps =
+      0.05;  ///< What is flown stands, and does not begin to move: m/s2, too.
+
   PipelineConfig config_;
   core::StageMeter& meter_;
   governor::DecisionPolicy& policy_;

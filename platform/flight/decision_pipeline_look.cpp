@@ -14,7 +14,6 @@ constexpr Nanos kLookFirst{4'000'000'000};   // a half turn at 45 degrees a seco
 constexpr Nanos kLookAgain{12'000'000'000};  // the same, and once round
 constexpr Nanos kSettles{500'000'000};       // images of the place where it has stepped back to
 constexpr double kStepBack_m = 3.0;
-constexpr double kStands_mps = 0.05;
 constexpr double kSlowly_mps = 1.0;
 constexpr double kHere_m = 0.3;  // nearer than that a direction means little
 constexpr std::size_t kCorners = 32;
@@ -57,7 +56,7 @@ std::optional<Vector3> DecisionPipeline::viewpoint_W() noexcept {
 
 void DecisionPipeline::look_on(const DecisionInput& in, core::StageBudget& budget,
                                DecisionOutput& out) noexcept {
-  const bool stands = draft_.start.v_W.norm() <= kStands_mps && !in.climbing;
+  const bool stands = draft_.start.v_W.norm() <= kAtRest_mps && !in.climbing;
   if (out.smoother_status == Status::kOk || !stands) {
     look_W_.reset();
     return;

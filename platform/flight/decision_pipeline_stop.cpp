@@ -50,7 +50,6 @@ void DecisionPipeline::hasten(const DecisionInput& in, DecisionOutput& out) cons
 }
 
 void DecisionPipeline::leave(double room_m, core::StageBudget& budget, DecisionOutput& out) noexcept {
-  constexpr double kAtRest_mps = 0.05;  // of what is flown, and m/s2
   constexpr double kLeaving_mps = 0.5;
   constexpr double kSamePlace_m = 2.0;  // as far as a way out leads
   constexpr int kTriesFiner = 4;        // failures: the governor asks for finer cells meanwhile

@@ -1,8 +1,6 @@
 #include "platform/live/plant.hpp"
 
 #include <fmt/format.h>
-#include <pthread.h>
-#include <sched.h>
 #include <time.h>
 
 #include <algorithm>
@@ -19,6 +17,7 @@
 #include "platform/live/pictures.hpp"
 #include "platform/live/plant_ports.hpp"
 #include "platform/live/plant_side.hpp"
+#include "platform/rt/lane_thread.hpp"
 #include "platform/rt/monotonic_clock.hpp"
 #include "platform/sitl/aircraft/simulated_aircraft.hpp"
 
@@ -244,10 +243,7 @@ PlantReport Plant::run(const std::function<void(const PlantProgress&)>& progress
   constexpr std::uint64_t kAskEvery = 10, kTellEvery = 100;  // minor frames
   pictures_.set_shift(clock_.epoch());
   pictures_.start();  // at the priority of ordinary work
-  sched_param priority{};
-  priority.sched_priority = kPriority;
-  // Without the right to it, as well as it goes.
-  (void)pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);
+  rt::take_priority(kPriority);
   start_ = turning_ = clock_.now();
   listened_ = start_ - kListenAgain;
   heard_ = start_ - kSilent;

@@ -76,6 +76,12 @@ std::vector<std::string> why_not_real_time() {
   return reasons;
 }
 
+void take_priority(int priority) noexcept {
+  sched_param param{};
+  param.sched_priority = priority;
+  (void)pthread_setschedparam(pthread_self(), SCHED_FIFO, &param);
+}
+
 LaneThread::~LaneThread() {
   request_stop();
   join();

@@ -30,6 +30,9 @@ struct Placement {
 /// real-time privilege, no CPU for a lane.
 [[nodiscard]] std::vector<std::string> why_not_real_time();
 
+/// SCHED_FIFO for the calling thread, 1 .. 99. Where this process has no right to it the thread goes on as well as it goes.
+void take_priority(int priority) noexcept;
+
 /// Sleeps to each release by absolute time, and runs the frame. The stack is mapped, painted and prefaulted
 /// by start(); pages and context switches are those between the first and the last frame.
 class LaneThread {

@@ -1,4 +1,4 @@
-/// CLOCK_MONOTONIC, counted from the start of the run.
+/// CLOCK_MONOTONIC: of this machine, and counted from the start of the run.
 #pragma once
 
 #include <time.h>
@@ -7,11 +7,18 @@
 
 namespace roborun::rt {
 
-/// RT-safe: no system call on Linux (vDSO). Never set back: the wall clock has no part in it.
+/// Of this machine: on it are the stamps of sensor ports and of the kernel's buses. RT-safe: no system call on Linux (vDSO).
+[[nodiscard]] inline MonotonicTime monotonic_now() noexcept {
+  timespec t{};
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return MonotonicTime{Nanos{static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec}};
+}
+
+/// RT-safe. Never set back: the wall clock has no part in it.
 class MonotonicClock final : public firmware_if::Clock {
  public:
-  MonotonicClock() noexcept : epoch_(raw()) {}
-  [[nodiscard]] MonotonicTime now() const noexcept override { return MonotonicTime{raw() - epoch_}; }
+  MonotonicClock() noexcept : epoch_(monotonic_now().time_since_epoch()) {}
+  [[nodiscard]] MonotonicTime now() const noexcept override { return monotonic_now() - epoch_; }
   /// What CLOCK_MONOTONIC showed at the start of the run.
   [[nodiscard]] Nanos epoch() const noexcept { return epoch_; }
   /// For system calls that take an absolute CLOCK_MONOTONIC time.
@@ -21,11 +28,6 @@ class MonotonicClock final : public firmware_if::Clock {
   }
 
  private:
-  [[nodiscard]] static Nanos raw() noexcept {
-    timespec t{};
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return Nanos{static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec};
-  }
   Nanos epoch_;
 };
 

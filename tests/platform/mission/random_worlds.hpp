@@ -11,8 +11,8 @@
 
 #include "core/random/counter_rng.hpp"
 #include "platform/board/board_profile.hpp"
+#include "platform/evaluation/suite.hpp"
 #include "platform/mission/mission.hpp"
-#include "platform/sitl/judge/way_judge.hpp"
 #include "platform/vehicle/vehicle_file.hpp"
 
 namespace roborun::mission {
@@ -20,7 +20,7 @@ namespace roborun::mission {
 /// Of all flights.
 struct RandomWorldsResult {
   int reached{}, collided{};
-  int possible{};                 ///< There is a way for the radius + 0.2 m, as the judge says.
+  int possible{};                 ///< The judge finds a way (evaluation/suite.hpp).
   int possible_reached{};         ///< Of these.
   int frames{};                   ///< Judged.
   int without_a_stop{};           ///< Commitments that do not end at rest, or whose way touches an obstacle.
@@ -33,7 +33,6 @@ struct RandomWorldsResult {
 };
 
 constexpr double kBodyRadius_m = 0.6;
-constexpr double kJudgeMargin_m = 0.2;
 
 /// 30 m long and 20 m wide, 4 to 10 pillars of 0.4 to 1.5 m radius: somewhere between open and a thicket.
 inline sitl::World random_world(std::uint64_t number) {
@@ -99,7 +98,7 @@ inline RandomWorldsResult fly_random_worlds(std::uint64_t first, std::uint64_t c
     };
     const report::MissionReport report = fly_mission(world, config, {});
     result.reached += report.result.reached_goal ? 1 : 0;
-    const bool possible = sitl::judge_way(world, {.radius_m = kBodyRadius_m + kJudgeMargin_m}).way;
+    const bool possible = !std::isnan(evaluation::judged_way_m(world, kBodyRadius_m));
     result.possible += possible ? 1 : 0;
     result.possible_reached += possible && report.result.reached_goal ? 1 : 0;
     if (possible && !report.result.reached_goal)
@@ -124,6 +123,7 @@ inline void expect_safe(const RandomWorldsResult& result, int worlds) {
   EXPECT_EQ(result.collided, 0);
   EXPECT_EQ(result.without_a_stop, 0);
   EXPECT_GT(result.frames, 1000 * worlds) << "something was judged";
+  EXPECT_GT(result.reached, worlds / 2);
   EXPECT_GT(result.possible, worlds / 2);
   EXPECT_LE(200 * (result.possible - result.possible_reached), result.possible) << "0.5 % at most";
   EXPECT_LE(result.fastest_mps, 6.0 * 1.15);
