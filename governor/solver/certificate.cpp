@@ -10,8 +10,9 @@ namespace {
 constexpr double kTolerance = 1e-9;
 constexpr double kInfinite = 1e12;
 
-bool near(double a, double b) noexcept {
-  return std::fabs(a - b) <= kTolerance * (1.0 + std::max(std::fabs(a), std::fabs(b)));
+/// False for what is not finite: the tolerance is relative to what is right, not to what is said.
+bool near(double right, double said) noexcept {
+  return std::fabs(right - said) <= kTolerance * (1.0 + std::fabs(right));
 }
 
 bool well_posed(const SolverProblem& p) noexcept {
@@ -102,8 +103,9 @@ Claim claim_of(const SolverProblem& p, const SolverSolution& s, double time_s) n
 
 /// Step 1, primal feasibility: every slack is >= 0, and latency and objective are what the knobs give.
 Verdict check_primal(const Claim& c) noexcept {
-  for (std::size_t i = 1; i < kConstraintCount; ++i) {
-    if (!(c.slack[i] >= -kTolerance * c.scale[i])) return Verdict::kVolume;
+  for (std::size_t i = c.slack.size(); --i > 0;) {
+    // An infinite volume would have an infinite tolerance.
+    if (!(c.slack[i] >= -kTolerance * c.scale[i]) || std::isinf(c.slack[i])) return Verdict::kVolume;
   }
   if (!(c.gap_s >= -kTolerance * c.scale[Constraint::kDeadline])) return Verdict::kLate;
   if (!near(c.latency_s, c.solution.latency_s) || !near(c.gap_s * c.gap_s, c.solution.objective_s2))
@@ -113,11 +115,11 @@ Verdict check_primal(const Claim& c) noexcept {
 
 /// Step 2, dual feasibility and complementary slackness: m_i >= 0, and m_i g_i = 0.
 Verdict check_multipliers(const Claim& c) noexcept {
-  for (std::size_t i = 0; i < kConstraintCount; ++i) {
-    const double multiplier = c.solution.multiplier[i];
+  for (std::size_t i = 0; const double multiplier : c.solution.multiplier) {
     if (!(multiplier >= 0.0) || !std::isfinite(multiplier)) return Verdict::kSign;
     if (multiplier > 0.0 && !c.tight(i)) return Verdict::kComplementary;
     if (((c.solution.active >> i) & 1U) != 0 && !c.tight(i)) return Verdict::kComplementary;
+    ++i;
   }
   return Verdict::kAccepted;
 }
@@ -135,10 +137,11 @@ Verdict check_stationary(const Claim& c) noexcept {
           m[Constraint::kV1Max],
       -pull * t.slope2 - m[Constraint::kPlanSome] + m[Constraint::kV2Max]};
   const std::array<double, 3> slope{t.slope0, t.slope0 + t.slope1, t.slope2};
-  for (std::size_t i = 0; i < 3; ++i) {
+  for (std::size_t i = 0; const double residual : gradient) {
     // A gap within the tolerance of the deadline is no gap.
-    if (!(std::fabs(gradient[i]) <= kTolerance * (1.0 + 2.0 * std::fabs(c.time_s)) * (slope[i] + 1e-12)))
+    if (!(std::fabs(residual) <= kTolerance * (1.0 + 2.0 * std::fabs(c.time_s)) * (slope[i] + 1e-12)))
       return Verdict::kStationary;
+    ++i;
   }
   return Verdict::kAccepted;
 }

@@ -6,6 +6,7 @@
 #include "core/random/counter_rng.hpp"
 #include "governor/solver/certificate.hpp"
 #include "governor/solver/lattice_solver.hpp"
+#include "tests/governor/solver_problems.hpp"
 #include "tests/support/limits.hpp"
 #include "tests/support/names.hpp"
 #include "tests/support/no_alloc_scope.hpp"
@@ -15,26 +16,6 @@ namespace {
 
 using test::kInfinity;
 using test::kNan;
-
-SolverProblem random_problem(core::CounterRng& rng) {
-  SolverProblem p;
-  p.delta_d_s = rng.uniform(-0.1, 3.0);
-  for (LatencyModel& m : p.model) {
-    const double scale = rng.uniform(0.0, 2e-4);
-    for (std::size_t i = 0; i < kPrecisionLevels; ++i) {
-      m.fixed_s[i] = rng.uniform(0.0, 0.2) / static_cast<double>(i + 1);
-      m.slope_s_per_m3[i] = rng.below(8) == 0 ? 0.0 : scale / static_cast<double>(1ULL << (3 * i));
-    }
-  }
-  p.g_min_m = rng.below(3) == 0 ? rng.uniform(0.0, 12.0) : 0.0;
-  p.g_avg_m = rng.below(5) == 0 ? kInfinity : rng.uniform(0.0, 12.0);
-  p.d_obs_m = rng.below(5) == 0 ? kInfinity : rng.uniform(0.0, 12.0);
-  p.p1_coarsest_level = static_cast<int>(rng.below(6));
-  p.v_sensor_m3 = rng.below(8) == 0 ? 0.0 : rng.uniform(0.0, 5e4);
-  p.v_map_m3 = rng.uniform(0.0, 2e5);
-  p.v2_max_m3 = rng.uniform(0.0, 1e5);
-  return p;
-}
 
 /// Exhaustive: every lattice pair, volumes on a dense grid. Least objective that it finds.
 double exhaustive(const SolverProblem& p) {
@@ -119,68 +100,6 @@ TEST(LatticeSolver, AmongEqualsItPrefersVolumeThenFinerCells) {
     }
   }
   EXPECT_GT(ties, 1000);
-}
-
-TEST(Certificate, RejectsEveryCorruption) {
-  core::CounterRng rng(2);
-  int checked = 0;
-  for (int n = 0; n < 4000; ++n) {
-    const SolverProblem p = random_problem(rng);
-    const SolverSolution s = solve(p);
-    if (s.status != Status::kOk) {
-      SolverSolution bad = s;
-      bad.status = Status::kOk;
-      ASSERT_NE(verify(p, bad), Verdict::kAccepted);
-      continue;
-    }
-    ++checked;
-    for (int field = 0; field < 11; ++field) {
-      SolverSolution bad = s;
-      if (field == 0) bad.v0_m3 = bad.v1_m3 + 1.0;
-      if (field == 1) bad.v1_m3 = std::min(p.v_sensor_m3, p.v_map_m3) + 1.0;
-      if (field == 2) bad.v2_m3 = p.v2_max_m3 + 1.0;
-      if (field == 3) bad.p0_level = bad.p1_level + 1;
-      if (field == 4) bad.latency_s += 0.001;
-      if (field == 5) bad.v0_m3 = -1.0;
-      if (field == 6) bad.objective_s2 += 0.001;
-      if (field == 7) bad.multiplier[static_cast<std::size_t>(Constraint::kV2Max)] = -1.0;
-      if (field == 8) bad.multiplier[static_cast<std::size_t>(Constraint::kDeadline)] = 1.0 + p.delta_d_s;
-      if (field == 9) bad.status = Status::kInfeasible;
-      if (field == 10) bad.status = Status::kInvalidArgument;
-      // A multiplier on the deadline changes nothing where nothing costs anything.
-      const auto slope = [&p](std::size_t m, int level) {
-        return p.model[m].slope_s_per_m3[static_cast<std::size_t>(level)];
-      };
-      if (field == 8 && (s.active & 1U) != 0 &&
-          slope(0, s.p0_level) + slope(1, s.p1_level) + slope(2, s.p1_level) == 0.0)
-        continue;
-      ASSERT_NE(verify(p, bad), Verdict::kAccepted) << "instance " << n << ", corruption " << field;
-    }
-  }
-  EXPECT_GT(checked, 1000);
-}
-
-TEST(Certificate, RejectsVolumesThatLeaveTimeAndAPairThatCannotUseIt) {
-  SolverProblem p;
-  p.delta_d_s = 1.0;
-  p.g_avg_m = p.d_obs_m = 1.0;
-  p.p1_coarsest_level = 1;
-  p.v_sensor_m3 = p.v_map_m3 = 1000.0;
-  p.v2_max_m3 = 1000.0;
-  for (LatencyModel& m : p.model) m.slope_s_per_m3 = {1e-4, 1e-5, 0, 0, 0, 0};
-  const SolverSolution s = solve(p);
-  ASSERT_EQ(verify(p, s), Verdict::kAccepted);
-  SolverSolution less = s;
-  less.v2_m3 -= 10.0;
-  less.latency_s -= 10.0 * p.model[2].slope_s_per_m3[static_cast<std::size_t>(s.p1_level)];
-  less.objective_s2 = (p.delta_d_s - less.latency_s) * (p.delta_d_s - less.latency_s);
-  less.active = 0;
-  less.multiplier = {};
-  EXPECT_EQ(verify(p, less), Verdict::kStationary);
-  // The best of the coarser pair, with a certificate that is right for that pair.
-  SolverProblem coarser = p;
-  coarser.g_min_m = 0.5;
-  EXPECT_EQ(verify(p, solve(coarser)), Verdict::kBetterPair);
 }
 
 TEST(LatticeSolver, SeesAllBeforeItSeesFiner) {
@@ -324,14 +243,6 @@ TEST(LatticeSolver, ConstraintsAndReasonsHaveTheNamesOfReports) {
                                                        "empty_precision", "empty_volume", "too_slow"};
   for (std::size_t i = 0; i < names.size(); ++i) EXPECT_STREQ(to_string(kReasons[i]), names[i]);
   EXPECT_STREQ(to_string(static_cast<Reason>(kGapAverage | kObstacle)), "unknown");
-}
-
-TEST(Certificate, VerdictsSayWhatIsWrong) {
-  test::expect_names<Verdict>({"accepted", "precision outside its interval", "volume outside its bounds",
-                               "late", "latency or objective wrong", "multiplier negative",
-                               "multiplier or active bit on a constraint that is not tight", "not stationary",
-                               "another pair is better", "not infeasible", "not invalid"},
-                              "unknown");
 }
 
 }  // namespace
