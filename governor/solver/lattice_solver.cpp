@@ -71,6 +71,12 @@ double affordable(double time_s, double slope, double most) noexcept {
   return slope * most <= time_s ? most : time_s / slope;
 }
 
+/// Of a pair with zero volumes.
+double fixed_s_of(const SolverProblem& p, std::size_t i0, std::size_t i1) noexcept {
+  return p.model[Knob::kPerceive].fixed_s[i0] + p.model[Knob::kExport].fixed_s[i1] +
+         p.model[Knob::kPlan].fixed_s[i1];
+}
+
 /// False if the pair has no answer.
 bool solve_pair(const SolverProblem& p, const Bounds& b, double delta_d_s, int p0, int p1,
                 Candidate& out) noexcept {
@@ -79,8 +85,7 @@ bool solve_pair(const SolverProblem& p, const Bounds& b, double delta_d_s, int p
   const double a = p.model[Knob::kPerceive].slope_s_per_m3[i0];
   const double e = p.model[Knob::kExport].slope_s_per_m3[i1];
   const double c = p.model[Knob::kPlan].slope_s_per_m3[i1];
-  const double fixed_s = p.model[Knob::kPerceive].fixed_s[i0] + p.model[Knob::kExport].fixed_s[i1] +
-                         p.model[Knob::kPlan].fixed_s[i1];
+  const double fixed_s = fixed_s_of(p, i0, i1);
   const double most_s = fixed_s + a * b.v0_m3 + e * b.v1_m3 + c * b.v2_m3;
   if (!(fixed_s <= delta_d_s) || !std::isfinite(a + e + c)) return false;
   out = {p0, p1, b.v0_m3, b.v1_m3, b.v2_m3, most_s, delta_d_s - most_s};
@@ -118,8 +123,8 @@ void certify(const SolverProblem& p, const Bounds& b, bool deadline, SolverSolut
   set(s, s.v1_m3 >= p.v1_max_m3, bit(Constraint::kV1Max));
   set(s, s.v2_m3 >= b.v2_m3, bit(Constraint::kV2Max));
   const double next_m = p.p_min_m * static_cast<double>(2U << static_cast<unsigned>(s.p0_level));
-  set(s, s.p0_level == b.p0_coarsest && next_m > p.g_avg_m, kGapAverage);
-  set(s, s.p0_level == b.p0_coarsest && next_m > p.d_obs_m, kObstacle);
+  set(s, next_m > p.g_avg_m, kGapAverage);
+  set(s, next_m > p.d_obs_m, kObstacle);
   set(s, s.p0_level == b.p0_finest && b.p0_finest > 0, kGapMin);
   if (deadline) return;  // the objective is zero: so are all multipliers
   const auto i0 = static_cast<std::size_t>(s.p0_level);
@@ -218,9 +223,8 @@ SolverSolution solve(const SolverProblem& problem) noexcept {
   }
   s.p0_level = std::clamp(b.p0_coarsest, 0, b.p1_coarsest);
   s.p1_level = b.p1_coarsest;
-  s.latency_s = problem.model[Knob::kPerceive].latency_s(s.p0_level, 0.0) +
-                problem.model[Knob::kExport].latency_s(s.p1_level, 0.0) +
-                problem.model[Knob::kPlan].latency_s(s.p1_level, 0.0);
+  s.latency_s =
+      fixed_s_of(problem, static_cast<std::size_t>(s.p0_level), static_cast<std::size_t>(s.p1_level));
   s.objective_s2 = (delta_d_s - s.latency_s) * (delta_d_s - s.latency_s);
   return s;
 }

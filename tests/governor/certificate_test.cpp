@@ -30,33 +30,6 @@ struct Row {
   double tolerance;
 };
 
-double dot(const std::array<double, 3>& a, const std::array<double, 3>& v) {
-  return a[0] * v[0] + a[1] * v[1] + a[2] * v[2];
-}
-
-/// What one pair of precisions costs, and whether it may be chosen.
-struct Pair {
-  double fixed_s{};
-  std::array<double, 3> slope{};
-  bool allowed{};
-};
-
-Pair pair_of(const SolverProblem& p, int p0, int p1) {
-  Pair pair;
-  if (p0 < 0 || p1 < 0 || p0 >= p.levels || p1 >= p.levels) return pair;
-  const auto& [perceive, hand_on, plan] = static_cast<const std::array<LatencyModel, 3>&>(p.model);
-  const double cell_m = std::ldexp(p.p_min_m, p0);
-  const bool in_interval = cell_m >= p.g_min_m && cell_m <= std::min(p.g_avg_m, p.d_obs_m);
-  const auto fine = static_cast<std::size_t>(p0);
-  const auto coarse = static_cast<std::size_t>(p1);
-  pair.fixed_s = perceive.fixed_s[fine] + hand_on.fixed_s[coarse] + plan.fixed_s[coarse];
-  pair.slope = {perceive.slope_s_per_m3[fine], hand_on.slope_s_per_m3[coarse], plan.slope_s_per_m3[coarse]};
-  pair.allowed = in_interval && p0 <= p1 && p1 <= std::max(p.p1_coarsest_level, 0);
-  return pair;
-}
-
-double bounded(double x) { return std::min(x, 1e12); }
-
 /// The least distance to the deadline that a pair can reach; infinite without one that is in time.
 double least_gap_s(const SolverProblem& p, double time_s) {
   const double most1 = bounded(std::min({p.v_sensor_m3, p.v_map_m3, p.v1_max_m3}));
@@ -131,29 +104,6 @@ Verdict second_judge(const SolverProblem& p, const SolverSolution& s) {
   }
   const double allowance_s = kRelative * (gap_s + 1e-6 * (1.0 + std::fabs(time_s)));
   return gap_s - least_s > allowance_s ? Verdict::kBetterPair : Verdict::kAccepted;
-}
-
-/// As random_problem, of milliseconds to minutes, with bounds of all kinds.
-SolverProblem wide_problem(core::CounterRng& rng) {
-  SolverProblem p = random_problem(rng);
-  const double scale = std::array<double, 3>{1e-3, 1.0, 30.0}[rng.below(3)];
-  p.delta_d_s *= scale;
-  for (LatencyModel& m : p.model) {
-    for (double& x : m.fixed_s) x *= scale;
-    for (double& x : m.slope_s_per_m3) x *= scale;
-  }
-  const double odd[] = {kInfinity, 1e15, 0.0, -1.0, 5.0, 2e4};
-  double* const bounds[] = {&p.v_sensor_m3, &p.v_map_m3, &p.v0_max_m3, &p.v1_max_m3, &p.v2_max_m3};
-  while (rng.below(2) == 0) *bounds[rng.below(5)] = odd[rng.below(6)];
-  if (rng.below(16) == 0) p.v_sensor_m3 = p.v_map_m3 = p.v1_max_m3 = kInfinity;
-  if (rng.below(16) == 0) p.levels = static_cast<int>(rng.below(9)) - 1;
-  if (rng.below(16) == 0) p.p_min_m = rng.uniform(0.0, 1.0);
-  if (rng.below(16) == 0) p.model[rng.below(3)].slope_s_per_m3[rng.below(6)] = kInfinity;
-  if (rng.below(32) == 0) p.delta_d_s = kInfinity;
-  if (rng.below(32) == 0) p.p1_coarsest_level = -1;
-  if (rng.below(16) == 0)
-    p.g_min_m = p.g_avg_m = PrecisionLattice{}.cell_size_m(static_cast<int>(rng.below(6)));
-  return p;
 }
 
 /// Latency and objective as they follow from the knobs, where the levels are any.

@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "core/random/counter_rng.hpp"
@@ -102,6 +105,123 @@ TEST(LatticeSolver, AmongEqualsItPrefersVolumeThenFinerCells) {
   EXPECT_GT(ties, 1000);
 }
 
+/// What the docstrings of Constraint and Reason say, from the knobs alone.
+std::uint16_t expected_active(const SolverProblem& p, const SolverSolution& s) {
+  std::array<bool, 12> on{};
+  const double time_s = bounded(p.delta_d_s);
+  on[0] = time_s - s.latency_s <= 1e-12 * (1.0 + time_s);
+  on[1] = s.v0_m3 == 0.0;
+  on[2] = s.v1_m3 == s.v0_m3;
+  on[3] = s.v1_m3 >= p.v_sensor_m3;
+  on[4] = s.v1_m3 >= p.v_map_m3;
+  on[5] = s.v2_m3 == 0.0;
+  on[6] = s.v0_m3 >= p.v0_max_m3;
+  on[7] = s.v1_m3 >= p.v1_max_m3;
+  on[8] = s.v2_m3 >= bounded(p.v2_max_m3);
+  int finest = kPrecisionLevels, coarsest = -1;
+  for (int level = 0; level < kPrecisionLevels; ++level) {
+    if (!pair_of(p, level, level).allowed) continue;
+    finest = std::min(finest, level);
+    coarsest = level;
+  }
+  const double next_m = std::ldexp(p.p_min_m, s.p0_level + 1);
+  on[9] = s.p0_level == coarsest && next_m > p.g_avg_m;
+  on[10] = s.p0_level == coarsest && next_m > p.d_obs_m;
+  on[11] = s.p0_level == finest && s.p0_level != 0;
+  std::uint16_t active = 0;
+  for (std::size_t i = 0; i < on.size(); ++i)
+    active = static_cast<std::uint16_t>(active | (on[i] ? 1U << i : 0U));
+  return active;
+}
+
+TEST(LatticeSolver, SaysWhatBoundsItAndHowQuickTheQuickestDecisionIs) {
+  core::CounterRng rng(8);
+  int bounded_by_all = 0;
+  int too_slow = 0;
+  for (int n = 0; n < 20'000; ++n) {
+    const SolverProblem p = wide_problem(rng);
+    const SolverSolution s = solve(p);
+    if (p.levels < 1 || p.levels > kPrecisionLevels) {
+      ASSERT_EQ(s.status, Status::kInvalidArgument);
+      ASSERT_EQ(s.p0_level + s.p1_level + s.active, 0);
+      ASSERT_EQ(s.latency_s, 0.0);
+      continue;
+    }
+    if (s.status == Status::kOk) {
+      ASSERT_EQ(s.active, expected_active(p, s)) << n;
+      ASSERT_EQ(verify(p, s), Verdict::kAccepted) << n;
+      ++bounded_by_all;
+      continue;
+    }
+    const auto fine = static_cast<std::size_t>(s.p0_level);
+    const auto coarse = static_cast<std::size_t>(s.p1_level);
+    const double fixed_s = p.model[0].fixed_s[fine] + p.model[1].fixed_s[coarse] + p.model[2].fixed_s[coarse];
+    ASSERT_EQ(s.latency_s, fixed_s) << n;
+    ASSERT_EQ(s.objective_s2, (bounded(p.delta_d_s) - fixed_s) * (bounded(p.delta_d_s) - fixed_s)) << n;
+    too_slow += s.active == kTooSlow ? 1 : 0;
+  }
+  EXPECT_GT(bounded_by_all, 5000);
+  EXPECT_GT(too_slow, 100);
+}
+
+TEST(LatticeSolver, BoundsBeyondItsLevelsAreThoseOfItsLevels) {
+  SolverProblem p;
+  p.delta_d_s = 1.0;
+  p.v_sensor_m3 = p.v_map_m3 = 1.0;
+  p.g_avg_m = p.d_obs_m = 100.0;
+  p.g_min_m = 100.0;
+  EXPECT_EQ(solve(p).active, kEmptyPrecision);
+  p.g_min_m = 0.0;
+  p.levels = 3;
+  p.p1_coarsest_level = 5;
+  p.delta_d_s = -1.0;
+  EXPECT_EQ(solve(p).p0_level, 2) << "the quickest decision there is";
+  EXPECT_EQ(solve(p).p1_level, 2);
+}
+
+/// Pairs 0, 1 and 1, 1, of which the coarser one would be taken but for the others' tolerance.
+struct Close {
+  SolverProblem p;
+  Close(double time_s, double volume_m3) {
+    p.g_avg_m = p.d_obs_m = 1.0;
+    p.p1_coarsest_level = 1;
+    p.v_sensor_m3 = p.v_map_m3 = p.v2_max_m3 = volume_m3;
+    p.delta_d_s = time_s;
+    p.model[1].fixed_s[0] = 1e6;
+  }
+};
+
+TEST(LatticeSolver, AGapThatIsHardlySmallerIsTheSame) {
+  for (const double gap_s : {1e-7, 0.5}) {
+    for (const double by : {-1.6, 0.6, 1.6}) {
+      Close close(gap_s + 1e-3, 0.0);
+      const double same_s = 1e-10 * gap_s + 1e-14;
+      close.p.model[0].fixed_s = {1e-3, 1e-3 + by * same_s};
+      EXPECT_EQ(solve(close.p).p0_level, by > 1.0 ? 1 : 0) << gap_s << ", " << by;
+      // The other way round: the finer one has the smaller gap.
+      close.p.model[0].fixed_s = {1e-3 + by * same_s, 1e-3};
+      EXPECT_EQ(solve(close.p).p0_level, by < -1.0 ? 1 : 0) << gap_s << ", " << by;
+    }
+  }
+}
+
+TEST(LatticeSolver, AVolumeThatIsHardlyMoreIsTheSame) {
+  for (const double by : {-1.6, 0.6, 1.6}) {
+    const double more_s = by * 1e-6 * 1e-2;
+    Close perceived(1.0, 1e6);  // 50 m3 of it in time
+    perceived.p.model[0].slope_s_per_m3 = {1e-2, 1e-2};
+    perceived.p.model[0].fixed_s = {0.5, 0.5 - more_s};
+    EXPECT_EQ(solve(perceived.p).p0_level, by > 1.0 ? 1 : 0) << by;
+    Close planned(1.0, 10.0);
+    planned.p.model[0].slope_s_per_m3 = {1e-2, 1e-2};
+    planned.p.model[2].slope_s_per_m3 = {1e-2, 1e-2};
+    planned.p.v2_max_m3 = 1e6;
+    planned.p.model[0].fixed_s = {0.5, 0.5 - more_s};
+    EXPECT_EQ(solve(planned.p).p0_level, by > 1.0 ? 1 : 0) << by;
+    EXPECT_EQ(solve(planned.p).v0_m3, 10.0);
+  }
+}
+
 TEST(LatticeSolver, SeesAllBeforeItSeesFiner) {
   SolverProblem p;
   const core::CostProfile costs = core::paper_profile();
@@ -132,6 +252,7 @@ TEST(LatticeSolver, NamesWhyThereIsNoAnswer) {
   SolverSolution s = solve(p);
   EXPECT_EQ(s.status, Status::kInfeasible);
   EXPECT_EQ(s.active, kEmptyPrecision);
+  EXPECT_EQ(s.p0_level, 0);
   p.g_avg_m = p.d_obs_m = 5.0;
   p.g_min_m = 9.0;
   EXPECT_EQ(solve(p).active, kEmptyPrecision);
