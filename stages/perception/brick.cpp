@@ -50,6 +50,12 @@ constexpr Word thin_in(Word word) noexcept {
   return word & ((word >> 1U) | (word >> 2U)) & ~(word >> 3U) & kOnes;
 }
 
+/// The lowest bit of each half byte that holds a surface that was met more than once: evidence::kSureFrom or more.
+constexpr Word sure_in(Word word) noexcept {
+  static_assert(evidence::kSureFrom == 0b1011U);
+  return (word >> 3U) & ((word >> 2U) | ((word >> 1U) & word)) & kOnes;
+}
+
 /// evidence::after_miss() of those of sixteen cells whose half bytes are set in `selected`.
 template <bool kInPart, bool kOfTheThin>
 constexpr Word after_miss(Word word, Word selected) noexcept {
@@ -141,6 +147,7 @@ void Brick::read(CellBlock& cells) const noexcept {
     const Word folded = not_free | (not_free >> 1U) | (not_free >> 2U) | (not_free >> 3U);
     const std::uint32_t free = gather_ones(~folded & kOnes);
     const std::uint32_t occupied = gather_ones(((word[w] >> 3U) & kOnes) | thin_in(word[w]));
+    const std::uint32_t sure = gather_ones(sure_in(word[w]));
     for (unsigned pair = 0; pair < 4; ++pair) {
       const auto four = [pair](std::uint32_t bits) {
         return (bits >> (2U * pair) & 3U) | (bits >> (2U * pair + 6U) & 12U);
@@ -148,6 +155,7 @@ void Brick::read(CellBlock& cells) const noexcept {
       const std::size_t row = first_row + kBlockCells * (pair / 2) + pair % 2;
       cells.free[row] = static_cast<std::uint16_t>(cells.free[row] | (four(free) << cx));
       cells.occupied[row] = static_cast<std::uint16_t>(cells.occupied[row] | (four(occupied) << cx));
+      cells.sure[row] = static_cast<std::uint16_t>(cells.sure[row] | (four(sure) << cx));
     }
   }
 }
@@ -174,6 +182,9 @@ void Brick::read_doubled(std::size_t eighth, CellBlock& cells) const noexcept {
     const unsigned free = gather(~(other | other >> 1U | other >> 2U) & kBytes);
     const unsigned occupied = gather(flags >> 1U & kBytes);
     if ((free | occupied) == 0) continue;
+    unsigned sure = 0;
+    for (std::size_t half = 0; half < 8 && occupied != 0; ++half)
+      sure |= ((sure_in(word[4 * i + half / 2]) >> (32U * (half % 2))) & 0xFFFFFFFFU) != 0 ? 1U << half : 0U;
     const auto [first_row, cx] = kPlaceOfWord[4 * i];
     const unsigned shift = cx / 2U + ((eighth & 1U) != 0 ? 8U : 0U);
     for (std::size_t pair = 0; pair < 4; ++pair) {
@@ -181,6 +192,7 @@ void Brick::read_doubled(std::size_t eighth, CellBlock& cells) const noexcept {
       cells.free[row] = static_cast<std::uint16_t>(cells.free[row] | (free >> (2U * pair) & 3U) << shift);
       cells.occupied[row] =
           static_cast<std::uint16_t>(cells.occupied[row] | (occupied >> (2U * pair) & 3U) << shift);
+      cells.sure[row] = static_cast<std::uint16_t>(cells.sure[row] | (sure >> (2U * pair) & 3U) << shift);
     }
   }
 }

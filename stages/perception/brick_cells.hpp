@@ -30,6 +30,8 @@ inline constexpr unsigned kMost = 8;
 
 [[nodiscard]] constexpr bool is_occupied(unsigned cell) noexcept { return cell > kPartlyFree; }
 [[nodiscard]] constexpr bool is_thin(unsigned cell) noexcept { return is_occupied(cell) && cell <= kThin; }
+/// Met more than once. The least such value is kSureFrom.
+inline constexpr unsigned kSureFrom = kOccupied + kHit + 1;
 [[nodiscard]] constexpr unsigned after_hit(unsigned cell) noexcept {
   if (is_thin(cell)) return kThin;
   const unsigned next = (is_occupied(cell) ? cell : kOccupied) + kHit;

@@ -274,6 +274,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   SurfaceRow row_{};
   TileRow tiles_{};
   std::uint64_t revision_{0};
+  bool mixes_{
+      false};  ///< Some camera's pixels are now and then between two depths: what one look met may be nothing.
   double reach_m_{0.0};    ///< From the trajectory: v0 was spent up to here.
   Brick free_brick_{};     ///< What every free position reads as.
   Brick surface_brick_{};  ///< The same for kSurfaceBrick.

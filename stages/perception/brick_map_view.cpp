@@ -160,6 +160,7 @@ BlockContent BrickMap::read(const Vector3& corner_W, double cell_m, CellBlock& c
   if (brick == &surface_brick_) return BlockContent::kUnknown;
   lookups += brick->word.size();
   brick->read(cells);
+  if (!mixes_) cells.sure = cells.occupied;
   return BlockContent::kMixed;
 }
 
@@ -179,6 +180,7 @@ BlockContent BrickMap::read_doubled(const Vector3& corner_W, CellBlock& cells,
     lookups += brick == &free_brick_ ? 0 : kWorkOfAMip;
     brick->read_doubled(eighth, cells);
   }
+  if (!mixes_) cells.sure = cells.occupied;
   if (free == 8) return BlockContent::kFree;
   return unknown == 8 ? BlockContent::kUnknown : BlockContent::kMixed;
 }

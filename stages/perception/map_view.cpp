@@ -32,6 +32,7 @@ BlockContent read_cell_by_cell(const MapView& view, const Vector3& corner_W, dou
       if (state == CellState::kOccupied) cells.occupied[row] |= bit, ++occupied;
     }
   }
+  cells.sure = cells.occupied;
   if (free == kBlockCells * cells.free.size()) return BlockContent::kFree;
   return free + occupied == 0 ? BlockContent::kUnknown : BlockContent::kMixed;
 }
@@ -55,13 +56,16 @@ void merge_eighth(const CellBlock& fine, std::size_t eighth, CellBlock& cells) n
     for (std::size_t y = 0; y < kHalf; ++y) {
       const std::size_t at = 2 * z * kBlockCells + 2 * y, above = at + kBlockCells;
       const auto& f = fine.free;
-      const auto& o = fine.occupied;
       const unsigned all = unsigned{f[at]} & f[at + 1] & f[above] & f[above + 1];
-      const unsigned any = unsigned{o[at]} | o[at + 1] | o[above] | o[above + 1];
+      const auto any_of = [at, above](const CellRows& o) {
+        return unsigned{o[at]} | o[at + 1] | o[above] | o[above + 1];
+      };
       const std::size_t to =
           (z + ((eighth & 4U) != 0 ? kHalf : 0)) * kBlockCells + y + ((eighth & 2U) != 0 ? kHalf : 0);
       cells.free[to] = static_cast<std::uint16_t>(cells.free[to] | halved<false>(all) << shift);
-      cells.occupied[to] = static_cast<std::uint16_t>(cells.occupied[to] | halved<true>(any) << shift);
+      cells.occupied[to] =
+          static_cast<std::uint16_t>(cells.occupied[to] | halved<true>(any_of(fine.occupied)) << shift);
+      cells.sure[to] = static_cast<std::uint16_t>(cells.sure[to] | halved<true>(any_of(fine.sure)) << shift);
     }
   }
 }
@@ -90,6 +94,7 @@ BlockContent read_eighths(const MapView& view, const Vector3& corner_W, CellBloc
       ++free;
       fine.free.fill(0xFFFF);
       fine.occupied.fill(0);
+      fine.sure.fill(0);
     }
     merge_eighth(fine, eighth, cells);
   }

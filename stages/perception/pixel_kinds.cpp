@@ -75,16 +75,25 @@ void tell_pixels_lanes(const firmware_if::DepthFrame& frame, std::size_t v, std:
     const auto low = hn::Sub(z, t), high = hn::Add(z, t);
     const auto depth = hn::IfThenElseZero(is_surface, z);
     const auto at = [&](const float* p) { return hn::LoadU(d, p); };
-    const auto shares = [&](auto n) { return hn::And(hn::Ge(n, low), hn::Le(n, high)); };
+    const auto sloped =
+        hn::Add(hn::Set(d, rules.same_m),
+                hn::Mul(z, hn::Add(hn::Set(d, rules.slope), hn::Mul(hn::Set(d, rules.quadratic_per_m), z))));
+    const auto same = rules.mixes ? hn::Min(sloped, t) : t;
+    const auto same_low = hn::Sub(z, same), same_high = hn::Add(z, same);
+    const auto shares = [&](auto n) { return hn::And(hn::Ge(n, same_low), hn::Le(n, same_high)); };
     const auto left = at(here - 1), right = at(here + 1), up = at(above), down = at(below);
     const auto beside = hn::Or(shares(left), shares(right)), along = hn::Or(shares(up), shares(down));
     if (hn::AllTrue(d, hn::Or(hn::And(beside, along), hn::Not(is_surface)))) {
       hn::StoreU(depth, d, row.depth_m.data() + u);
       continue;
     }
-    const auto lone =
-        hn::Not(hn::Or(hn::Or(beside, along), hn::Or(hn::Or(shares(at(above - 1)), shares(at(above + 1))),
-                                                     hn::Or(shares(at(below - 1)), shares(at(below + 1))))));
+    const auto one = hn::Set(d, 1.0F);
+    const auto counted = [&](auto n) { return hn::IfThenElseZero(shares(n), one); };
+    const auto sharing =
+        hn::Add(hn::Add(hn::Add(counted(left), counted(right)), hn::Add(counted(up), counted(down))),
+                hn::Add(hn::Add(counted(at(above - 1)), counted(at(above + 1))),
+                        hn::Add(counted(at(below - 1)), counted(at(below + 1)))));
+    const auto lone = hn::Lt(sharing, one);
     const auto any = [&](const auto& is) {
       return hn::Or(
           hn::Or(hn::Or(is(left), is(right)), hn::Or(is(up), is(down))),
@@ -93,12 +102,15 @@ void tell_pixels_lanes(const firmware_if::DepthFrame& frame, std::size_t v, std:
     const auto nearer = [&](auto n) { return hn::Lt(n, low); };
     const auto farther = [&](auto n) { return hn::Gt(n, high); };
     const auto mixes = hn::Lt(hn::Zero(d), hn::Set(d, rules.mixes ? 1.0F : 0.0F));
-    const auto mixed = hn::And(hn::And(mixes, lone), hn::And(any(nearer), any(farther)));
+    const auto nearer_or_unknown = [&](auto n) { return hn::Not(hn::Ge(n, same_low)); };
+    // One neighbour that shares it may be another such pixel.
+    const auto mixed = hn::And(hn::And(mixes, hn::Lt(sharing, hn::Set(d, 1.5F))), any(nearer_or_unknown));
     hn::StoreU(hn::IfThenElse(mixed, hn::Zero(d), depth), d, row.depth_m.data() + u);
     const auto stands_out = [&](auto a, auto b) {
       return hn::And(hn::Not(hn::Or(hn::Le(a, high), hn::Le(b, high))), hn::Or(farther(a), farther(b)));
     };
-    const auto doubtful = hn::And(mixes, hn::Or(lone, any(nearer)));
+    const auto is_rim = hn::Gt(sharing, hn::Set(d, 2.5F));
+    const auto doubtful = hn::And(mixes, hn::Or(hn::Or(hn::Or(lone, mixed), is_rim), any(nearer)));
     // What is beyond the range may be so by noise alone: where a plane ends at it, every other pixel would stand out.
     const auto may_stand_out = hn::Lt(high, hn::Set(d, frame.range_m));
     const auto thin =

@@ -10,21 +10,24 @@
 
 namespace roborun::stages {
 
-/// Two pixels are at one depth if they differ by no more than constant_m + quadratic_per_m z^2. `mixes`: DepthError.
+/// Between two pixels is a step if they differ by more than constant_m + quadratic_per_m z^2.
 struct PixelRules {
   float constant_m{}, quadratic_per_m{};
-  bool mixes{};
+  bool mixes{};  ///< DepthError.
+  /// Two pixels share a surface if there is no step between them. Those of a camera that mixes must not differ by more than
+  /// same_m + slope z + quadratic_per_m z^2, either.
+  float same_m{}, slope{};
 };
 
 /// Some pixels of a row.
 struct PixelRow {
   static constexpr std::size_t kPad = 8;  ///< Room for whole vectors.
-  /// 0: no surface, or, of a camera that mixes, a pixel between two depths that no neighbour shares: it saw a bit of both, and
-  /// nothing is where it ends.
+  /// 0: no surface, or, of a camera that mixes, a pixel whose surface one neighbour shares at most and that is not nearer than all the others:
+  /// it saw a bit of what is in front and a bit of what is behind (which may have no depth), and nothing is where it ends.
   alignas(32) std::array<float, kMaxImageSide + kPad> depth_m{};
   /// Bit i of all words: pixel i is nearer than both pixels beside it, or above and below it, by a step. (One of them may have
   /// no information.) Of a camera that mixes it must not be alone, nor beside one that is nearer: such pixels lie anywhere
-  /// between what is in front and what is behind.
+  /// between what is in front and what is behind. Nor may more than two neighbours share its surface: that is the ragged rim of something wide.
   std::array<std::uint64_t, kMaxImageSide / 64 + 1> thin{};
   /// Of these, pixels of which both neighbours are known to be farther.
   std::array<std::uint64_t, kMaxImageSide / 64 + 1> surely_thin{};

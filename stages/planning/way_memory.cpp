@@ -29,12 +29,18 @@ std::uint64_t digest_of(const CellBlock& cells) noexcept {
     digest = (digest ^ four) * 0x9E3779B97F4A7C15ULL;
     digest ^= digest >> 29U;
   }
+  if (cells.sure == cells.occupied) return digest;
+  for (const std::uint16_t row : cells.sure) digest = core::mix64(digest + row);
   return digest;
 }
 
-}  // namespace
-
-namespace {
+/// Whether some of the cells are occupied, but not surely.
+bool has_doubts(const WayCells& cells) noexcept {
+  for (std::size_t i = 0; i < cells.block.size(); ++i)
+    if (cells.content[i] == BlockContent::kMixed && cells.block[i]->sure != cells.block[i]->occupied)
+      return true;
+  return false;
+}
 
 /// The first block, in cells from the world's origin, and the number of blocks.
 struct Extent {
@@ -340,6 +346,8 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   WayPlaces places;
   find_places(cells, width_, 0, places);
   forbid(block, places);
+  WayCells sure = cells;
+  if (has_doubts(cells)) sure.occupied = &CellBlock::sure;
   const auto all = [](const CellRows& rows, std::uint16_t value) {
     return std::all_of(rows.begin(), rows.end(), [value](std::uint16_t row) { return row == value; });
   };
@@ -348,7 +356,7 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   std::int32_t uniform = all(places.known, 0xFFFF) ? kKnown : all(places.open, 0xFFFF) ? kOpen : 0;
   CellRows passable{};
   if (uniform == 0) {
-    passable = find_passable(block, cells, places);
+    passable = find_passable(block, cells, sure, places);
     if (all(places.known, 0) && all(places.open, 0) && all(passable, 0)) uniform = kClosed;
   }
   if (uniform < 0) {
@@ -359,7 +367,7 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   Block* b = take(position);
   if (b == nullptr) return;
   WayPlaces narrow;
-  if (narrow_width_ < width_) find_places(cells, narrow_width_, 0, narrow);
+  if (narrow_width_ < width_ || sure.occupied != cells.occupied) find_places(sure, narrow_width_, 0, narrow);
   forbid(block, narrow);
   for (std::size_t i = 0; i < narrow.known.size(); ++i)
     places.doubtful[i] =

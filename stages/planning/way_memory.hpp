@@ -174,9 +174,9 @@ class WayMemory final : public Ways {
   [[nodiscard]] std::uint32_t step_cost(const Cell& from, const Cell& to, double price) const noexcept;
   void wait_at(const Vector3& p_W) noexcept;
 
-  /// Of a block: where the body may fit. What of it nobody has seen joins the open places: it may turn out to have room.
+  /// Of a block: where the body may fit, by what is surely occupied. What of it nobody has seen joins the open places: it may turn out to have room.
   [[nodiscard]] CellRows find_passable(const Cell& block, const WayCells& cells,
-                                       WayPlaces& places) const noexcept;
+                                       const WayCells& cells_if_sure, WayPlaces& places) const noexcept;
   /// kNoPath: none of what may be passable leads from one to the other, within what was seen; kInfeasible: some does;
   /// kBudgetSpent.
   [[nodiscard]] Status may_lead(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,

@@ -38,10 +38,13 @@ CellRows across(const CellRows& rows, std::size_t face) noexcept {
 
 }  // namespace
 
-CellRows WayMemory::find_passable(const Cell& block, const WayCells& cells,
+CellRows WayMemory::find_passable(const Cell& block, const WayCells& cells, const WayCells& cells_if_sure,
                                   WayPlaces& places) const noexcept {
   WayPlaces cores;
   find_places(cells, core_width_, width_ - core_width_, cores);
+  WayPlaces sure_cores = cores;
+  if (cells_if_sure.occupied != cells.occupied)
+    find_places(cells_if_sure, core_width_, width_ - core_width_, sure_cores);
   CellRows passable{};
   const std::array<std::int32_t, 3> first{kBlockCells * block.x + corner_.x,
                                           kBlockCells * block.y + corner_.y,
@@ -59,7 +62,7 @@ CellRows WayMemory::find_passable(const Cell& block, const WayCells& cells,
   }
   for (unsigned i = 0; i < 256; ++i) {
     const bool is_inside = ((inside[1] >> (i % kRow)) & (inside[2] >> (i / kRow)) & 1U) != 0;
-    const unsigned found = static_cast<unsigned>(cores.known[i]) | cores.open[i];
+    const unsigned found = static_cast<unsigned>(sure_cores.known[i]) | sure_cores.open[i];
     unsigned row = is_inside ? found & inside[0] : 0U;
     for (unsigned bits = config_.fence.empty() ? 0U : row; bits != 0; bits &= bits - 1) {
       const int x = __builtin_ctz(bits);

@@ -18,7 +18,7 @@ void gather(const WayCells& cells, std::size_t side, WideRows& rows) noexcept {
         std::uint64_t half = cells.content[index] == BlockContent::kFree ? 0 : std::uint64_t{0xFFFF} << 32U;
         if (cells.content[index] == BlockContent::kMixed) {
           const auto not_free = static_cast<std::uint16_t>(~cells.block[index]->free[at]);
-          half = std::uint64_t{not_free} << 32U | cells.block[index]->occupied[at];
+          half = std::uint64_t{not_free} << 32U | (cells.block[index]->*cells.occupied)[at];
         }
         row |= half << (16U * x);
       }

@@ -32,6 +32,7 @@ struct WayRooms {
 struct WayCells {
   std::array<const CellBlock*, 8> block{};
   std::array<BlockContent, 8> content{};
+  CellRows CellBlock::*occupied{&CellBlock::occupied};  ///< Which of them count: these, or the sure ones.
 };
 
 /// The rows of places of a block that are of one kind. width 1 .. 17.

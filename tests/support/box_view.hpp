@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "stages/perception/map_view.hpp"
@@ -13,6 +15,7 @@ class BoxView final : public stages::MapView {
  public:
   Aabb free_W{};
   std::vector<Aabb> occupied;
+  std::vector<Aabb> unsure;  ///< What is occupied in them was met once.
 
   [[nodiscard]] bool is_free(const Aabb& box_W, std::uint64_t& lookups) const noexcept override {
     ++lookups;
@@ -36,6 +39,18 @@ class BoxView final : public stages::MapView {
     return free_W.contains(p_W) ? stages::CellState::kFree : stages::CellState::kUnknown;
   }
   [[nodiscard]] double cell_m() const noexcept override { return 0.3; }
+  [[nodiscard]] stages::BlockContent read(const Vector3& corner_W, double cell_m, stages::CellBlock& cells,
+                                          std::uint64_t& lookups) const noexcept override {
+    const stages::BlockContent content = stages::read_cell_by_cell(*this, corner_W, cell_m, cells, lookups);
+    for (std::size_t i = 0; i < 16 * cells.sure.size() && !unsure.empty(); ++i) {
+      const Vector3 cell(static_cast<double>(i % 16), static_cast<double>(i / 16 % 16),
+                         static_cast<double>(i / 256));
+      for (const Aabb& box : unsure)
+        if (box.contains(corner_W + cell_m * (cell + Vector3::Constant(0.5))))
+          cells.sure[i / 16] = static_cast<std::uint16_t>(cells.sure[i / 16] & ~(1U << (i % 16)));
+    }
+    return content;
+  }
 };
 
 }  // namespace roborun::test

@@ -40,6 +40,35 @@ TEST(Brick, MipsSayWhatTheCellsSay) {
   }
 }
 
+TEST(Brick, ReadsWhatIsFreeOccupiedAndSurelyOccupied) {
+  core::CounterRng rng(9);
+  auto sut = std::make_unique<Brick>();
+  sut->fill(evidence::kFree);
+  for (int n = 0; n < 400; ++n)
+    sut->set_cell(static_cast<std::uint32_t>(rng.below(kCellsPerBrick)), kStates[rng.below(kStates.size())]);
+  sut->refresh();
+  CellBlock cells, doubled{};
+  sut->read(cells);
+  constexpr std::size_t kEighth = 6;  // low x, high y and z
+  sut->read_doubled(kEighth, doubled);
+  const auto bit = [](const CellRows& rows, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+    return ((rows[16 * z + y] >> x) & 1) != 0;
+  };
+  CellRows expected{};
+  for (std::uint32_t i = 0; i < kCellsPerBrick; ++i) {
+    const std::uint32_t x = i % 16, y = i / 16 % 16, z = i / 256;
+    const unsigned cell = sut->cell(morton3(x, y, z));
+    ASSERT_EQ(bit(cells.free, x, y, z), cell == evidence::kFree);
+    ASSERT_EQ(bit(cells.occupied, x, y, z), evidence::is_occupied(cell));
+    const bool sure = cell > evidence::kOccupied && cell > evidence::after_hit(evidence::kFree);
+    ASSERT_EQ(bit(cells.sure, x, y, z), sure) << cell;
+    std::uint16_t& row = expected[16 * (z / 2 + 8) + y / 2 + 8];
+    if (sure) row = static_cast<std::uint16_t>(row | 1U << (x / 2));
+  }
+  EXPECT_EQ(doubled.sure, expected);
+  EXPECT_NE(doubled.sure, doubled.occupied);
+}
+
 TEST(Brick, EvidenceIsBounded) {
   unsigned cell = evidence::after_miss(evidence::kUnknown);
   EXPECT_EQ(cell, evidence::kFree);

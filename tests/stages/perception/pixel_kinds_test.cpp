@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <bit>
+#include <limits>
 #include <vector>
 
 namespace roborun::stages {
@@ -46,6 +47,62 @@ TEST_F(PixelAtTheRange, OfAPlaneThatEndsThereDoesNot) {
   for (std::size_t u = 0; u < kSide; u += 2) at(u, 39) = 9.95F;
   for (std::size_t u = 0; u < kSide; u += 8) at(u, 37) = 9.98F;
   EXPECT_EQ(surely_thin(), 0);
+}
+
+/// A surface at 2 m that ends at column 32 before one at 9 m, of a camera whose pixels may lie between both.
+class PixelsBetween : public ::testing::Test {
+ protected:
+  PixelsBetween() : depth_m_(static_cast<std::size_t>(kSide) * kSide, 9.0F) {
+    for (std::size_t v = 0; v < kSide; ++v)
+      for (std::size_t u = 0; u < 32; ++u) at(u, v) = 2.0F;
+  }
+  float& at(std::size_t u, std::size_t v) { return depth_m_[v * kSide + u]; }
+  const PixelRow& row(std::size_t v) {
+    firmware_if::DepthFrame frame;
+    frame.depth_m = depth_m_;
+    frame.width = frame.height = kSide;
+    frame.range_m = kRange_m;
+    tell_pixels(frame, v, 0, kSide, {0.25F, 0.005F, true, 0.0F, 0.02F}, row_);
+    return row_;
+  }
+
+ private:
+  std::vector<float> depth_m_;
+  PixelRow row_{};
+};
+
+TEST_F(PixelsBetween, AreNothingThoughTheyAreNearWhatIsInFront) {
+  at(32, 20) = 2.2F;
+  EXPECT_EQ(row(20).depth_m[32], 0.0F);
+  EXPECT_EQ(row(20).depth_m[31], 2.0F) << "the rim itself is there";
+  EXPECT_EQ(row(20).depth_m[33], 9.0F);
+  at(32, 20) = 2.05F;
+  EXPECT_EQ(row(20).depth_m[32], 2.05F) << "so little is noise, or a slope";
+}
+
+TEST_F(PixelsBetween, AreNothingWhereWhatIsBehindHasNoDepth) {
+  for (std::size_t v = 0; v < kSide; ++v)
+    for (std::size_t u = 33; u < kSide; ++u) at(u, v) = std::numeric_limits<float>::quiet_NaN();
+  for (std::size_t v = 19; v < 22; ++v) at(32, v) = std::numeric_limits<float>::quiet_NaN();
+  at(32, 20) = 2.3F;
+  EXPECT_EQ(row(20).depth_m[32], 0.0F);
+}
+
+TEST_F(PixelsBetween, AreNothingAndNotThinWhereTwoOfThemAgree) {
+  at(32, 20) = at(32, 21) = 4.0F;
+  for (const std::size_t v : {20U, 21U}) {
+    EXPECT_EQ(row(v).depth_m[32], 0.0F) << v;
+    EXPECT_FALSE(row(v).any_thin) << v;
+  }
+  at(50, 40) = at(50, 41) = at(50, 42) = 4.0F;
+  EXPECT_EQ(row(41).depth_m[50], 4.0F) << "what stands before all around it is there";
+  EXPECT_TRUE(row(41).any_thin);
+}
+
+TEST_F(PixelsBetween, TheRaggedRimOfSomethingWideIsNotThin) {
+  at(32, 20) = 2.0F;  // above and below it is farther
+  EXPECT_EQ(row(20).depth_m[32], 2.0F);
+  EXPECT_FALSE(row(20).any_thin);
 }
 
 }  // namespace

@@ -182,6 +182,24 @@ TEST_F(WayMemoryTest, AGapThatIsOneCellTooNarrowIsAWayWhereThereIsNoOther) {
   EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath) << "closed";
 }
 
+TEST_F(WayMemoryTest, ASurfaceThatWasMetOnceIsLookedAtAgainBeforeItProvesAnything) {
+  config_.body_m = 0.45;
+  box(20, -21, 20.6, 21);
+  box(-15, 20, 20.6, 20.6);
+  box(-15, -20.6, 20.6, -20);
+  view_.unsure.push_back({Vector3(19, -1.2, 0), Vector3(21, 1.2, 20)});
+  make();
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  EXPECT_GT(std::fabs(last_known(start_W_).y()), 10.0) << "it is open behind: around the outside";
+  box(-15.6, -21, -15, 21);
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  EXPECT_GT(last_known(start_W_).x(), 17.0) << "goes there to look closely";
+  EXPECT_LT(last_known(start_W_).x(), 20.0);
+  EXPECT_LT(std::fabs(last_known(start_W_).y()), 3.0);
+  view_.unsure.back().max_W.x() = 19.5;
+  EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath) << "met again";
+}
+
 TEST_F(WayMemoryTest, AHoleInAWallThatNobodySawIsAWayUntilItIsSeenToBeTooNarrow) {
   // Two cells of a wall: what surely fits inside the vehicle, which plans with six.
   config_.body_m = 0.6;
