@@ -121,6 +121,12 @@ void Brick::fill(unsigned value) noexcept {
 }
 
 void Brick::refresh() noexcept {
+  for (std::size_t w = 0; has_new && w < word.size(); ++w) {
+    static_assert(evidence::kMetNow == 0b0110U && evidence::kOccupied + evidence::kHit == 0b1010U);
+    const Word met_now = (word[w] >> 1U) & (word[w] >> 2U) & ~word[w] & ~(word[w] >> 3U) & kOnes;
+    word[w] ^= met_now * 0b1100U;
+  }
+  has_new = false;
   known_count = static_cast<std::uint16_t>(brick_flags(word, mip.data()));
   std::size_t from = 0;
   std::size_t to = 512;

@@ -15,6 +15,7 @@ struct Brick {
   std::array<std::uint8_t, 512 + 64 + 8 + 1> mip{};  ///< Levels 1 to 4, derived by refresh().
   bool dirty{};                                      ///< Written to in this scan.
   bool stale{};                                      ///< Cells changed since refresh().
+  bool has_new{};                                    ///< Some are evidence::kMetNow.
   std::uint64_t revision{};                          ///< BrickMap's number of what the cells are now.
   std::uint16_t known_count{};                       ///< Cells that are not unknown.
   std::int32_t x{}, y{}, z{};                        ///< Position in bricks from the map's corner.
@@ -38,6 +39,14 @@ struct Brick {
   void add_free(int level, std::uint32_t parent, std::uint8_t blocks, evidence::Past past = {}) noexcept;
   /// A surface in this cell of level 0.
   void add_hit(std::uint32_t morton) noexcept { set_cell(morton, evidence::after_hit(cell(morton))); }
+  /// The same, but what was not occupied before this scan is met once, however many pixels of it say so.
+  void add_hit_once(std::uint32_t morton) noexcept {
+    const unsigned before = cell(morton);
+    if (before == evidence::kMetNow) return;
+    const bool is_new = !evidence::is_occupied(before);
+    has_new = has_new || is_new;
+    set_cell(morton, is_new ? evidence::kMetNow : evidence::after_hit(before));
+  }
   /// A surface near this cell, nobody knows exactly where: what was free is unknown.
   void add_vague_hit(std::uint32_t morton) noexcept {
     if (!evidence::is_occupied(cell(morton))) set_cell(morton, evidence::kUnknown);

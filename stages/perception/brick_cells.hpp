@@ -16,6 +16,7 @@ inline constexpr std::size_t kCellsPerBrick = 4096;
 ///   1       free: seen past
 ///   2       seen past in part, once: still unknown
 ///   3 5 7   something thin, evidence 1 .. 3: only looks that would have seen it take from it
+///   6       a surface that this scan is the first to meet, of a camera that mixes: evidence kHit from the next refresh() on
 ///   8 .. 15 a surface, evidence 1 .. 8
 /// One look past all of a cell makes it free, two looks past a part of it do; one surface makes it occupied whatever was
 /// there; 8 looks past it clear the oldest obstacle, kHit looks one that was seen once.
@@ -26,10 +27,13 @@ inline constexpr unsigned kPartlyFree = 2;
 inline constexpr unsigned kThin = 7;      ///< As it is when it was just seen.
 inline constexpr unsigned kOccupied = 7;  ///< Plus the evidence.
 inline constexpr unsigned kHit = 3;
+inline constexpr unsigned kMetNow = 6;
 inline constexpr unsigned kMost = 8;
 
 [[nodiscard]] constexpr bool is_occupied(unsigned cell) noexcept { return cell > kPartlyFree; }
-[[nodiscard]] constexpr bool is_thin(unsigned cell) noexcept { return is_occupied(cell) && cell <= kThin; }
+[[nodiscard]] constexpr bool is_thin(unsigned cell) noexcept {
+  return is_occupied(cell) && cell <= kThin && cell != kMetNow;
+}
 /// Met more than once. The least such value is kSureFrom.
 inline constexpr unsigned kSureFrom = kOccupied + kHit + 1;
 [[nodiscard]] constexpr unsigned after_hit(unsigned cell) noexcept {

@@ -83,7 +83,10 @@ void BrickMap::add_cells(const SurfaceCamera& camera, bool vague, core::Work& wo
     }
     if (brick == nullptr) continue;
     const std::uint32_t morton = morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z));
-    vague ? brick->add_vague_hit(morton) : brick->add_hit(morton);
+    if (vague)
+      brick->add_vague_hit(morton);
+    else
+      mixes_ ? brick->add_hit_once(morton) : brick->add_hit(morton);
     ++work.units;
   }
 }

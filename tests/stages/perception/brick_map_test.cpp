@@ -84,6 +84,26 @@ TEST(Brick, EvidenceIsBounded) {
   EXPECT_EQ(looks_until_free(cell), 8);
 }
 
+TEST(Brick, WhatManyPixelsOfOneScanMeetIsMetOnce) {
+  auto sut = std::make_unique<Brick>();
+  sut->fill(evidence::kFree);
+  constexpr std::uint32_t kCell = 77;
+  CellBlock cells;
+  const auto scan = [&] {
+    for (int pixel = 0; pixel < 5; ++pixel) sut->add_hit_once(kCell);
+    sut->refresh();
+    sut->read(cells);
+    return std::any_of(cells.sure.begin(), cells.sure.end(), [](std::uint16_t row) { return row != 0; });
+  };
+  EXPECT_FALSE(scan());
+  EXPECT_EQ(sut->cell(kCell), evidence::after_hit(evidence::kFree));
+  EXPECT_EQ(sut->flags(1, kCell / 8) & content::kOccupied, content::kOccupied);
+  EXPECT_TRUE(scan()) << "met again";
+  sut->set_cell(kCell, evidence::kThin);
+  EXPECT_FALSE(scan());
+  EXPECT_EQ(sut->cell(kCell), evidence::kThin) << "what is thin stays so";
+}
+
 TEST(Brick, TwoLooksPastAPartAreALookPastAllOfIt) {
   unsigned cell = evidence::after_miss(evidence::kUnknown, {.in_part = true});
   EXPECT_EQ(cell, evidence::kPartlyFree);
