@@ -87,13 +87,6 @@ void tell_pixels_lanes(const firmware_if::DepthFrame& frame, std::size_t v, std:
       hn::StoreU(depth, d, row.depth_m.data() + u);
       continue;
     }
-    const auto one = hn::Set(d, 1.0F);
-    const auto counted = [&](auto n) { return hn::IfThenElseZero(shares(n), one); };
-    const auto sharing =
-        hn::Add(hn::Add(hn::Add(counted(left), counted(right)), hn::Add(counted(up), counted(down))),
-                hn::Add(hn::Add(counted(at(above - 1)), counted(at(above + 1))),
-                        hn::Add(counted(at(below - 1)), counted(at(below + 1)))));
-    const auto lone = hn::Lt(sharing, one);
     const auto any = [&](const auto& is) {
       return hn::Or(
           hn::Or(hn::Or(is(left), is(right)), hn::Or(is(up), is(down))),
@@ -102,15 +95,11 @@ void tell_pixels_lanes(const firmware_if::DepthFrame& frame, std::size_t v, std:
     const auto nearer = [&](auto n) { return hn::Lt(n, low); };
     const auto farther = [&](auto n) { return hn::Gt(n, high); };
     const auto mixes = hn::Lt(hn::Zero(d), hn::Set(d, rules.mixes ? 1.0F : 0.0F));
-    const auto nearer_or_unknown = [&](auto n) { return hn::Not(hn::Ge(n, same_low)); };
-    // One neighbour that shares it may be another such pixel.
-    const auto mixed = hn::And(hn::And(mixes, hn::Lt(sharing, hn::Set(d, 1.5F))), any(nearer_or_unknown));
-    hn::StoreU(hn::IfThenElse(mixed, hn::Zero(d), depth), d, row.depth_m.data() + u);
     const auto stands_out = [&](auto a, auto b) {
       return hn::And(hn::Not(hn::Or(hn::Le(a, high), hn::Le(b, high))), hn::Or(farther(a), farther(b)));
     };
-    const auto is_rim = hn::Gt(sharing, hn::Set(d, 2.5F));
-    const auto doubtful = hn::And(mixes, hn::Or(hn::Or(hn::Or(lone, mixed), is_rim), any(nearer)));
+    const auto alone = hn::Not(any([&](auto n) { return hn::And(hn::Ge(n, low), hn::Le(n, high)); }));
+    const auto doubtful = hn::And(mixes, hn::Or(alone, any(nearer)));
     // What is beyond the range may be so by noise alone: where a plane ends at it, every other pixel would stand out.
     const auto may_stand_out = hn::Lt(high, hn::Set(d, frame.range_m));
     const auto thin =
@@ -121,6 +110,17 @@ void tell_pixels_lanes(const firmware_if::DepthFrame& frame, std::size_t v, std:
     const auto between = [&](auto a, auto b) { return hn::And(farther(a), farther(b)); };
     const std::uint64_t sure = bits_of(hn::And(thin, hn::Or(between(left, right), between(up, down))));
     row.surely_thin[u / 64] |= sure << (u % 64);
+    // How many share its surface: one may be another such pixel.
+    const auto one = hn::Set(d, 1.0F);
+    const auto counted = [&](auto n) { return hn::IfThenElseZero(shares(n), one); };
+    const auto sharing =
+        hn::Add(hn::Add(hn::Add(counted(left), counted(right)), hn::Add(counted(up), counted(down))),
+                hn::Add(hn::Add(counted(at(above - 1)), counted(at(above + 1))),
+                        hn::Add(counted(at(below - 1)), counted(at(below + 1)))));
+    const auto is_nearer = [&](auto n) { return hn::Lt(n, same_low); };
+    const auto mixed =
+        hn::AndNot(thin, hn::And(hn::And(mixes, any(is_nearer)), hn::Lt(sharing, hn::Set(d, 1.5F))));
+    hn::StoreU(hn::IfThenElse(mixed, hn::Zero(d), depth), d, row.depth_m.data() + u);
   }
 }
 

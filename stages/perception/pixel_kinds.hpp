@@ -22,12 +22,12 @@ struct PixelRules {
 /// Some pixels of a row.
 struct PixelRow {
   static constexpr std::size_t kPad = 8;  ///< Room for whole vectors.
-  /// 0: no surface, or, of a camera that mixes, a pixel whose surface one neighbour shares at most and that is not nearer than all the others:
-  /// it saw a bit of what is in front and a bit of what is behind (which may have no depth), and nothing is where it ends.
+  /// 0: no surface, or, of a camera that mixes, a pixel that is not thin, beside one that is nearer, and shares its surface with
+  /// one neighbour at most: it saw a bit of what is in front and a bit of what is behind, and nothing is where it ends.
   alignas(32) std::array<float, kMaxImageSide + kPad> depth_m{};
   /// Bit i of all words: pixel i is nearer than both pixels beside it, or above and below it, by a step. (One of them may have
   /// no information.) Of a camera that mixes it must not be alone, nor beside one that is nearer: such pixels lie anywhere
-  /// between what is in front and what is behind. Nor may more than two neighbours share its surface: that is the ragged rim of something wide.
+  /// between what is in front and what is behind.
   std::array<std::uint64_t, kMaxImageSide / 64 + 1> thin{};
   /// Of these, pixels of which both neighbours are known to be farther.
   std::array<std::uint64_t, kMaxImageSide / 64 + 1> surely_thin{};
