@@ -55,6 +55,24 @@ HWY_INLINE void load_rows(const firmware_if::DepthFrame& frame, std::size_t v, s
   }
 }
 
+/// Whether something `is` true of any of the eight pixels around these.
+template <class Is>
+HWY_INLINE auto any_around(const float* here, const float* above, const float* below, const Is& is) {
+  const Floats d;
+  const auto at = [&](const float* p) { return is(hn::LoadU(d, p)); };
+  return hn::Or(hn::Or(hn::Or(at(here - 1), at(here + 1)), hn::Or(at(above), at(below))),
+                hn::Or(hn::Or(at(above - 1), at(above + 1)), hn::Or(at(below - 1), at(below + 1))));
+}
+/// Of how many.
+template <class Is>
+HWY_INLINE auto count_around(const float* here, const float* above, const float* below, const Is& is) {
+  const Floats d;
+  const auto one = hn::Set(d, 1.0F);
+  const auto at = [&](const float* p) { return hn::IfThenElseZero(is(hn::LoadU(d, p)), one); };
+  return hn::Add(hn::Add(hn::Add(at(here - 1), at(here + 1)), hn::Add(at(above), at(below))),
+                 hn::Add(hn::Add(at(above - 1), at(above + 1)), hn::Add(at(below - 1), at(below + 1))));
+}
+
 void tell_pixels_lanes(const firmware_if::DepthFrame& frame, std::size_t v, std::size_t u0, std::size_t u1,
                        const PixelRules& rules, PixelRow& row) {
   const Floats d;
@@ -87,11 +105,7 @@ void tell_pixels_lanes(const firmware_if::DepthFrame& frame, std::size_t v, std:
       hn::StoreU(depth, d, row.depth_m.data() + u);
       continue;
     }
-    const auto any = [&](const auto& is) {
-      return hn::Or(
-          hn::Or(hn::Or(is(left), is(right)), hn::Or(is(up), is(down))),
-          hn::Or(hn::Or(is(at(above - 1)), is(at(above + 1))), hn::Or(is(at(below - 1)), is(at(below + 1)))));
-    };
+    const auto any = [&](const auto& is) { return any_around(here, above, below, is); };
     const auto nearer = [&](auto n) { return hn::Lt(n, low); };
     const auto farther = [&](auto n) { return hn::Gt(n, high); };
     const auto mixes = hn::Lt(hn::Zero(d), hn::Set(d, rules.mixes ? 1.0F : 0.0F));
@@ -110,17 +124,12 @@ void tell_pixels_lanes(const firmware_if::DepthFrame& frame, std::size_t v, std:
     const auto between = [&](auto a, auto b) { return hn::And(farther(a), farther(b)); };
     const std::uint64_t sure = bits_of(hn::And(thin, hn::Or(between(left, right), between(up, down))));
     row.surely_thin[u / 64] |= sure << (u % 64);
-    // How many share its surface: one may be another such pixel.
-    const auto one = hn::Set(d, 1.0F);
-    const auto counted = [&](auto n) { return hn::IfThenElseZero(shares(n), one); };
-    const auto sharing =
-        hn::Add(hn::Add(hn::Add(counted(left), counted(right)), hn::Add(counted(up), counted(down))),
-                hn::Add(hn::Add(counted(at(above - 1)), counted(at(above + 1))),
-                        hn::Add(counted(at(below - 1)), counted(at(below + 1)))));
-    const auto is_nearer = [&](auto n) { return hn::Lt(n, same_low); };
-    const auto mixed =
-        hn::AndNot(thin, hn::And(hn::And(mixes, any(is_nearer)), hn::Lt(sharing, hn::Set(d, 1.5F))));
-    hn::StoreU(hn::IfThenElse(mixed, hn::Zero(d), depth), d, row.depth_m.data() + u);
+    hn::StoreU(depth, d, row.depth_m.data() + u);
+    if (!rules.mixes) continue;
+    // One neighbour that shares its surface may be another such pixel.
+    const auto few_share = hn::Lt(count_around(here, above, below, shares), hn::Set(d, 1.5F));
+    const auto mixed = hn::And(few_share, any([&](auto n) { return hn::Lt(n, same_low); }));
+    hn::StoreU(hn::IfThenZeroElse(hn::AndNot(thin, mixed), depth), d, row.depth_m.data() + u);
   }
 }
 

@@ -9,7 +9,8 @@
 namespace roborun::stages {
 
 /// A place (x, y, z) of a block is that of a vehicle `width` cells wide whose box begins with this cell. Known: all its
-/// cells are free. Open: none is occupied, some unknown. Doubtful: neither, but a narrower box at its corner is free.
+/// cells are free. Open: none is occupied, some unknown. Doubtful: neither, but a narrower box at its corner
+/// would be, if only what is surely occupied counted.
 /// Anything else is closed. Rooms 1 .. 7 are known, 8 .. 12 open, 13 .. 15 doubtful; 0 is closed. What is more than fits
 /// the numbers joins the last one.
 inline constexpr unsigned kFirstOpenRoom = 8;
