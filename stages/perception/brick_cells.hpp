@@ -34,7 +34,7 @@ inline constexpr unsigned kMost = 8;
 [[nodiscard]] constexpr bool is_thin(unsigned cell) noexcept {
   return is_occupied(cell) && cell <= kThin && cell != kMetNow;
 }
-/// Met more than once. The least such value is kSureFrom.
+/// From this value on a surface was met in more than one look (or by more than one pixel, of a camera that does not mix).
 inline constexpr unsigned kSureFrom = kOccupied + kHit + 1;
 [[nodiscard]] constexpr unsigned after_hit(unsigned cell) noexcept {
   if (is_thin(cell)) return kThin;

@@ -20,7 +20,7 @@ enum class BlockContent : std::uint8_t { kUnknown, kFree, kMixed };
 struct CellBlock {
   CellRows free{};
   CellRows occupied{};
-  CellRows sure{};  ///< Of the occupied: more was there than one pixel between two depths, or something thin.
+  CellRows sure{};  ///< Of the occupied: met in more than one look, and not only something thin.
 };
 
 }  // namespace roborun::stages
