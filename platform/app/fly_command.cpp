@@ -99,6 +99,9 @@ std::string words_of_refused(const report::MissionResult& r) {
     sensor = one.sensor;
   }
   if (!text.empty()) text = fmt::format("{:<12} refused images{}\n", r.design, text);
+  if (r.near_brakes > 0)
+    text += fmt::format("{:<12} braked {} times between two decisions for what was near in the way\n",
+                        r.design, r.near_brakes);
   if (r.map_drops > 0) text += fmt::format("{:<12} dropped its map {} times\n", r.design, r.map_drops);
   return text;
 }

@@ -223,7 +223,8 @@ void print_json(const live::LiveReport& r) {
                               {"ended", r.ended},
                               {"lane_misses", nlohmann::ordered_json::object()},
                               {"failsafe", events},
-                              {"not_real_time", r.missing}};
+                              {"not_real_time", r.missing},
+                              {"near_brakes", r.near_brakes}};
   if (r.autopilot)
     json["autopilot"] = {{"stage", r.autopilot->stage},
                          {"reason", r.autopilot->reason},
@@ -250,6 +251,8 @@ void print_words(const live::LiveReport& r) {
   fmt::print("{} after {:.1f} s and {:.1f} m; {}\n", r.reason, r.time_s, r.distance_m, r.ended);
   fmt::print("{} decisions, {} deadlines missed, {} heap calls and {} page faults in the lanes\n",
              r.decisions, r.deadline_misses, r.heap_calls_after_start, r.page_faults);
+  if (r.near_brakes > 0)
+    fmt::print("braked {} times between two decisions for what was near in the way\n", r.near_brakes);
   for (const live::LiveReport::Event& e : r.events)
     fmt::print("{:.1f} s: {}{}\n", e.time_s, e.action, e.conditions.empty() ? "" : " (" + e.conditions + ")");
   if (r.route)

@@ -184,6 +184,7 @@ void DecisionProgram::report_depth(MonotonicTime now) noexcept {
 }
 
 void DecisionProgram::look(const FlightReport& report, MonotonicTime now) noexcept {
+  report_.looked = now;
   frames_.clear();
   look_through_cameras(now);
   for (std::size_t i = 0; i < lidars_.size(); ++i) look_through_lidar(i, now);
@@ -196,6 +197,11 @@ void DecisionProgram::look(const FlightReport& report, MonotonicTime now) noexce
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     const std::size_t sensor = sensor_of_[i];
     note(i, report.airborne, now);
+    if (sensor < kMostCameras) {
+      const std::uint32_t bit = 1U << sensor;
+      report_.refused =
+          fault_[i] == stages::FrameFault::kNone ? report_.refused & ~bit : report_.refused | bit;
+    }
     if (fault_[i] != stages::FrameFault::kNone) continue;
     ++scan[sensor < kMostCameras ? 0 : 1 + sensor - kMostCameras];
     frames_[kept++] = frames_[i];

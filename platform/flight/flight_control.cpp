@@ -63,6 +63,12 @@ bool is_plausible(const firmware_if::ImuSample& sample) {
 
 }  // namespace
 
+double braking_mps2(const VehicleModel& vehicle) noexcept {
+  // What the path needs and what braking needs together stay within the tilt limit.
+  return std::min(kBrakeShare * vehicle.acceleration_mps2,
+                  std::max(tilt_acceleration_mps2(vehicle) - vehicle.acceleration_mps2, 0.5));
+}
+
 void FlightControl::sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_if::Barometer& barometer,
                           firmware_if::Odometry* odometry) {
   // At most a ring's worth a frame, so that a flood of samples cannot hold the lane.
@@ -220,10 +226,7 @@ TrajectoryPoint FlightControl::next_reference(MonotonicTime now) {
   if (!braking_) return committed_.at(now);
   // The same curve at a rate that falls to zero: p = c(s), v = c' s', a = c'' s'^2 + c' s''.
   if (brake_at_s_ < 0.0) brake_at_s_ = seconds(now - committed_.start_time) - period_s_;
-  // What the path needs and what braking needs together stay within the tilt limit.
-  const double brake_mps2 =
-      std::min(kBrakeShare * vehicle_.acceleration_mps2,
-               std::max(tilt_acceleration_mps2(vehicle_) - vehicle_.acceleration_mps2, 0.5));
+  const double brake_mps2 = braking_mps2(vehicle_);
   const double rate = brake_rate_;
   const double speed_mps = committed_.at_s(brake_at_s_).v_W.norm();
   brake_rate_ = std::max(rate - period_s_ * brake_mps2 / std::max(speed_mps, 1.0), 0.0);

@@ -18,6 +18,9 @@
 
 namespace roborun::flight {
 
+/// FlightControl::brake() slows down by so much.
+[[nodiscard]] double braking_mps2(const VehicleModel& vehicle) noexcept;
+
 /// The set-point time-out of PX4 and ArduCopter as they are asked to be.
 inline constexpr Nanos kAutopilotSilent{500'000'000};
 
@@ -70,6 +73,7 @@ class FlightControl {
   /// To a stop along the committed trajectory, whose path stays as it was checked; then it hovers there. What
   /// was offered is dropped, and nothing offered is flown until then.
   void brake();
+  [[nodiscard]] bool braking() const { return braking_; }
   /// Braked, and at the place of the stop.
   [[nodiscard]] bool standing(MonotonicTime now) const;
   /// Straight down from where it stands, slower near the height of the take-off, and on until it has landed.

@@ -9,7 +9,8 @@ using governor::Action;
 
 namespace {
 
-constexpr double kSeam_m = 0.3;  // between what is flown and what is offered
+// Between what is flown and what is offered.
+constexpr double kSeam_m = 0.3, kSeam_mps = 0.5;
 
 }  // namespace
 
@@ -43,9 +44,25 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
       return;
     case SlotId::kPublish:
       return publish(now);
+    case SlotId::kLook:
+      return look(now);
     default:
       return;
   }
+}
+
+void FlightProgram::look(MonotonicTime now) noexcept {
+  if (!control_.airborne() || control_.descending() || control_.braking()) return;
+  const DecisionReport& decision = mail_.decision.read();
+  if (!watch_.must_brake({now, decision.looked, decision.due, decision.refused, control_.committed(),
+                          control_.committed_number(), control_.estimator().past()}))
+    return;
+  brake_for_near();
+}
+
+void FlightProgram::brake_for_near() noexcept {
+  control_.brake();
+  ++near_brakes_;
 }
 
 void FlightProgram::publish(MonotonicTime now) noexcept {
@@ -69,7 +86,9 @@ void FlightProgram::take_offers(MonotonicTime now, const core::LaneExecutive& la
   if (!mail_.offer.take()) return;
   const Offer& offer = mail_.offer.read();
   const MonotonicTime start = std::max(offer.trajectory.start_time, now);
-  const bool fits = (control_.committed().at(start).p_W - offer.trajectory.at(start).p_W).norm() < kSeam_m;
+  const TrajectoryPoint flown = control_.committed().at(start), offered = offer.trajectory.at(start);
+  const bool fits =
+      (flown.p_W - offered.p_W).norm() < kSeam_m && (flown.v_W - offered.v_W).norm() < kSeam_mps;
   const bool braking = pilot_.action() == Action::kHold || (lane.reactions().braking() && !offer.is_stop);
   if (fits && !braking)
     control_.offer(offer.trajectory);

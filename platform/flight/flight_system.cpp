@@ -160,7 +160,9 @@ FlightSystem::FlightSystem(const FlightConfig& config, core::StageMeter& meter, 
                 : ways_               ? &*ways_
                                       : nullptr),
       control_(config.vehicle, seconds(config.minor_frame), gaze_of(config)),
-      flight_program_({config.vehicle, config.fence, config.answers}, control_, aircraft, mail_),
+      flight_program_(
+          {config.vehicle, config.fence, config.answers}, control_, aircraft, mail_,
+          {{slow_radius_m(config.vehicle), braking_mps2(config.vehicle), config.depth_error}, parts.watched}),
       decision_program_(
           {config.goal_W, config.seed, config.fence, config.bounds_W, config.minor_frame, config.depth_error},
           pipeline_, cameras, mail_, lidars, config.cloud_pixels, arena) {

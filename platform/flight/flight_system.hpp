@@ -24,6 +24,8 @@ struct FlightParts {
   stages::Planner& planner;
   governor::DecisionPolicy* policy{nullptr};  ///< Null: the governor that ships.
   stages::Ways* ways{nullptr};                ///< Null: the memory that ships, where knows_ways().
+  /// The cameras once more, for the flight lane's look between two decisions; empty: it does not look.
+  std::span<firmware_if::DepthCamera* const> watched{};
 };
 
 /// The published designs know their horizon alone.

@@ -38,7 +38,9 @@ struct Offer {
 /// Decision lane to flight lane: how it is, at least once a decision.
 struct DecisionReport {
   bool heard{false};
-  MonotonicTime due{};  ///< When it wants to be back.
+  MonotonicTime due{};      ///< When it wants to be back.
+  MonotonicTime looked{};   ///< When it read its images last.
+  std::uint32_t refused{};  ///< Bit i: what it got then of camera i was not believed.
   double depth_age_s{};
   /// The camera, or kMostCameras + the LiDAR, whose images are the oldest usable ones, and what was wrong with the newest; kNone:
   /// there was none.

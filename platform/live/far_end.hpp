@@ -43,6 +43,8 @@ class FarEnd : public flight::Aircraft {
   /// armed.
   [[nodiscard]] virtual std::vector<Need> look(MonotonicTime now) = 0;
   [[nodiscard]] virtual std::span<firmware_if::DepthCamera* const> cameras() noexcept = 0;
+  /// The same cameras once more, for the flight lane.
+  [[nodiscard]] virtual std::span<firmware_if::DepthCamera* const> watched() noexcept = 0;
   [[nodiscard]] virtual std::span<firmware_if::Lidar* const> lidars() noexcept = 0;
   /// The package, in flight; any thread. Where there is no hook nothing happens.
   virtual void release_package() noexcept {}

@@ -143,7 +143,8 @@ LiveRun::LiveRun(const LiveConfig& config)
     : config_(config),
       far_(far_end_of(config, clock_)),
       setup_(config.flight, {}, images_of(config), mission::parts_of({}, config.route, cap_mps_)),
-      system_(config.flight, meter_, *far_, far_->cameras(), setup_.parts(), setup_.arena(), far_->lidars()),
+      system_(config.flight, meter_, *far_, far_->cameras(), setup_.parts(far_->watched()), setup_.arena(),
+              far_->lidars()),
       flight_(system_, *far_, seen_),
       decisions_(system_, seen_),
       lanes_(lane_config(config), clock_, reactions_, {&flight_, &decisions_, &idle_, &watchdog_}),
@@ -319,6 +320,7 @@ void LiveRun::fill() {
   report_.reached_goal = report_.reason == "reached_goal";
   report_.distance_m = seen_.distance_m.load();
   report_.decisions = system_.decision_program().decisions();
+  report_.near_brakes = system_.flight_program().near_brakes();
   for (const core::LaneSpec& spec : core::kLanes) {
     const std::uint64_t misses = lanes_.lane(spec.id).statistics().deadline_misses;
     // The lane without a priority renders nothing here: nobody waits for it.

@@ -77,7 +77,9 @@ struct LiveReport {
       ended;  ///< How: "on the ground", "landed", "motors off", "the pilot's", "the autopilot's", or "in the air" after an overrun.
   double time_s{};      ///< From the first release of the lanes to the goal, or to the end.
   double distance_m{};  ///< Flown, by the estimate.
-  std::uint64_t decisions{}, deadline_misses{}, heap_calls_after_start{}, page_faults{};
+  std::uint64_t decisions{};
+  std::uint64_t near_brakes{};  ///< Between two decisions, for what was near in the way.
+  std::uint64_t deadline_misses{}, heap_calls_after_start{}, page_faults{};
   std::vector<std::pair<std::string, std::uint64_t>> lane_misses;  ///< The deadline misses, by lane.
   std::vector<PortUse> ports;
   std::optional<LiveAutopilot> autopilot;

@@ -47,6 +47,9 @@ class MavlinkAircraft final : public FarEnd {
   [[nodiscard]] std::span<firmware_if::DepthCamera* const> cameras() noexcept override {
     return pictures_.cameras();
   }
+  [[nodiscard]] std::span<firmware_if::DepthCamera* const> watched() noexcept override {
+    return pictures_.watched();
+  }
   [[nodiscard]] std::span<firmware_if::Lidar* const> lidars() noexcept override { return pictures_.lidars(); }
   [[nodiscard]] std::vector<PortUse> use(MonotonicTime now) const override;
   [[nodiscard]] const firmware_if::mavlink::Companion& companion() const noexcept { return companion_; }

@@ -31,6 +31,9 @@ class PortAircraft final : public FarEnd {
   [[nodiscard]] std::span<firmware_if::DepthCamera* const> cameras() noexcept override {
     return pictures_.cameras();
   }
+  [[nodiscard]] std::span<firmware_if::DepthCamera* const> watched() noexcept override {
+    return pictures_.watched();
+  }
   [[nodiscard]] std::span<firmware_if::Lidar* const> lidars() noexcept override { return pictures_.lidars(); }
   [[nodiscard]] std::vector<PortUse> use(MonotonicTime now) const override;
 

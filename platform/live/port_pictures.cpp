@@ -50,6 +50,7 @@ PortPictures::PortPictures(const sensor_port::VehiclePorts& ports, const SensorR
   for (std::size_t i = 0; i < rig_.cameras.size(); ++i) {
     prepare(camera_.emplace_back(), fmt::format("camera {}", i + 1), ports.camera(i), milliseconds(500));
     cameras_.push_back(&camera_.back().device);
+    watched_.push_back(&watched_camera_.emplace_back());
   }
   for (std::size_t i = 0; i < rig_.lidars.size(); ++i) {
     prepare(lidar_.emplace_back(), fmt::format("lidar {}", i + 1), ports.lidar(i), milliseconds(500));
@@ -61,9 +62,14 @@ Need PortPictures::look_at_camera(std::size_t index, MonotonicTime now) {
   Port<sensor_port::PortDepthCamera>& port = camera_[index];
   bool seen = false;
   Need need = look_at(
-      port, now, [&] { return port.device.open(port.path, clock_); },
+      port, now,
+      [&] {
+        std::string wrong = port.device.open(port.path, clock_);
+        return wrong.empty() ? watched_camera_[index].open(port.path, clock_) : wrong;
+      },
       [&] {
         firmware_if::DepthFrame frame;
+        (void)watched_camera_[index].read(frame);  // its mount is that of the first image
         if (port.device.read(frame) != Status::kOk) return;
         seen = true;
         optics_[index] = contradiction(frame, port.device.mount(), rig_.cameras[index]);

@@ -23,6 +23,8 @@ class PortPictures {
   /// As FarEnd::look(): a camera has to be the one of the vehicle file.
   void look(MonotonicTime now, std::vector<Need>& needs);
   [[nodiscard]] std::span<firmware_if::DepthCamera* const> cameras() noexcept { return cameras_; }
+  /// The same cameras once more, for another thread.
+  [[nodiscard]] std::span<firmware_if::DepthCamera* const> watched() noexcept { return watched_; }
   [[nodiscard]] std::span<firmware_if::Lidar* const> lidars() noexcept { return lidars_; }
   void use(MonotonicTime now, std::vector<PortUse>& all) const;
 
@@ -33,10 +35,11 @@ class PortPictures {
   SensorRig rig_;
   sensor_port::PortClock clock_;
   std::deque<Port<sensor_port::PortDepthCamera>> camera_;
+  std::deque<sensor_port::PortDepthCamera> watched_camera_;
   std::deque<Port<sensor_port::PortLidar>> lidar_;
   std::vector<std::string>
       optics_;  ///< Of each camera: what contradicts the vehicle file; empty: nothing, or not seen yet.
-  std::vector<firmware_if::DepthCamera*> cameras_;
+  std::vector<firmware_if::DepthCamera*> cameras_, watched_;
   std::vector<firmware_if::Lidar*> lidars_;
 };
 

@@ -27,8 +27,8 @@ class FlightSetup {
   FlightSetup(const FlightSetup&) = delete;
   FlightSetup& operator=(const FlightSetup&) = delete;
 
-  [[nodiscard]] flight::FlightParts parts() noexcept {
-    return {*parts_.map, *parts_.planner, policy_.get(), parts_.ways.get()};
+  [[nodiscard]] flight::FlightParts parts(std::span<firmware_if::DepthCamera* const> watched = {}) noexcept {
+    return {*parts_.map, *parts_.planner, policy_.get(), parts_.ways.get(), watched};
   }
   [[nodiscard]] core::Arena& arena() noexcept { return arena_; }
   /// To be asked once the flight system stands. Throws InputError if the arena was too small.

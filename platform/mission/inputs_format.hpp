@@ -42,9 +42,10 @@ enum class RecordKind : std::uint8_t {
   kMotors,     ///< MotorsCheck of a command.
   kMotorsOff,  ///< Terminated or disarmed.
   kDecision,   ///< DecisionValues.
-  kEnd         ///< FlightTotals. The last one.
+  kEnd,        ///< FlightTotals. The last one.
+  kNearBrake   ///< The flight lane's own look made it brake: its images are not kept.
 };
-inline constexpr std::size_t kRecordKinds = 14;
+inline constexpr std::size_t kRecordKinds = 15;
 
 /// Bytes of a record of each kind: least, most, and those of its head. What follows the head are words.
 struct RecordSize {
@@ -73,7 +74,8 @@ inline constexpr std::array<RecordSize, kRecordKinds> kRecordSizes{
      {12, 12, 4, {2, 4}},
      {0, 0, 0},
      {8 * kDecisionValues, 8 * kDecisionValues, 8 * kDecisionValues},
-     {24, 24, 24}}};
+     {24, 24, 24},
+     {0, 0, 0}}};
 
 struct FlightTotals {
   std::uint64_t digest{}, minor_frames{}, decisions{};

@@ -196,6 +196,8 @@ class MissionRun {
   void record_decision(const flight::DecisionOutput& out);
   /// What is due in this minor frame.
   void log_frame(MonotonicTime now);
+  /// What the flight lane's own look did.
+  void note_brake(MonotonicTime now);
   void log_decision(const log::DecisionEntry& entry, MonotonicTime now);
   void end_log(const char* reason);
   void record_failsafe();
@@ -208,7 +210,7 @@ class MissionRun {
   sitl::CameraRig rig_;
   sitl::SimulatedAircraft aircraft_;
   std::unique_ptr<sitl::AutopilotAircraft> autopilot_;  ///< Null: the runtime commands the motors.
-  std::vector<firmware_if::DepthCamera*> cameras_;
+  std::vector<firmware_if::DepthCamera*> cameras_, watched_;
   std::unique_ptr<log::FlightLog> log_;                                   ///< Null: there is none.
   std::unique_ptr<FlightRecorder> recorder_;                              ///< Null: no inputs are recorded.
   std::atomic<double> cap_mps_{std::numeric_limits<double>::infinity()};  ///< As a route says.
@@ -245,6 +247,7 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
                                         companion_config(*config.autopilot, config.flight.vehicle))
                                   : nullptr),
       cameras_(faults_.connect(rig_.cameras())),
+      watched_(faults_.connect(rig_.watched())),
       log_(config.log.empty() && config.viewer == nullptr
                ? nullptr
                : std::make_unique<log::FlightLog>(config.log, false)),
@@ -286,6 +289,15 @@ void MissionRun::log_frame(MonotonicTime now) {
   log_->write(record);
 }
 
+void MissionRun::note_brake(MonotonicTime now) {
+  const std::uint64_t brakes = system_.flight_program().near_brakes();
+  if (brakes == report_.result.near_brakes) return;
+  report_.result.near_brakes = brakes;
+  if (recorder_) recorder_->braked();
+  if (log_)
+    log_->event(now.time_since_epoch().count(), log::Level::kWarning, "flight", "braked for what is near");
+}
+
 void MissionRun::log_decision(const log::DecisionEntry& entry, MonotonicTime now) {
   if (!log_) return;
   log_->write(entry);
@@ -313,9 +325,9 @@ void MissionRun::end_log(const char* reason) {
 }
 
 flight::FlightParts MissionRun::parts() {
-  const flight::FlightParts own = setup_.parts();
+  const flight::FlightParts own = setup_.parts(watched_);
   stages::Planner& planner = faults_.empty() ? static_cast<stages::Planner&>(timed_planner_) : planner_;
-  return {timed_map_, planner, own.policy, own.ways};
+  return {timed_map_, planner, own.policy, own.ways, own.watched};
 }
 
 void MissionRun::refuse_silence() const {
@@ -485,6 +497,7 @@ report::MissionReport MissionRun::fly(const std::function<void(const Progress&)>
     if (const flight::DecisionOutput* decision = flight_.step(faults_.computer(now))) {
       record_decision(*decision);
     }
+    note_brake(now);
     log_frame(now);
     refuse_silence();
     const sitl::VehicleState& s = aircraft_.vehicle().state();

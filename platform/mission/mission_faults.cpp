@@ -11,11 +11,8 @@ std::vector<firmware_if::DepthCamera*> MissionFaults::connect(
     std::span<firmware_if::DepthCamera* const> cameras) {
   std::vector<firmware_if::DepthCamera*> all(cameras.begin(), cameras.end());
   if (empty()) return all;
-  camera_.reserve(all.size());
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    camera_.emplace_back(*all[i], static_cast<int>(i), line_);
-    all[i] = &camera_[i];
-  }
+  for (std::size_t i = 0; i < all.size(); ++i)
+    all[i] = &camera_.emplace_back(*all[i], static_cast<int>(i), line_);
   return all;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <optional>
 #include <vector>
 
@@ -22,7 +23,7 @@ class MissionFaults {
   [[nodiscard]] bool empty() const noexcept { return begun_.empty(); }
   /// For what can fail.
   [[nodiscard]] const sitl::FaultLine& line() const noexcept { return line_; }
-  /// The cameras behind their faults; themselves in a mission without faults.
+  /// The cameras behind their faults; themselves in a mission without faults. Once for each of their readers.
   [[nodiscard]] std::vector<firmware_if::DepthCamera*> connect(
       std::span<firmware_if::DepthCamera* const> cameras);
   /// Begins those that are due at `now`, and ends those that are over. True if the first one of all began.
@@ -38,7 +39,7 @@ class MissionFaults {
   std::vector<bool> begun_;  ///< By config_.faults.
   bool any_{false};
   std::array<std::optional<MonotonicTime>, governor::kPhaseCount> phase_begin_{};
-  std::vector<sitl::FaultyDepthCamera> camera_;
+  std::deque<sitl::FaultyDepthCamera> camera_;
 };
 
 /// Gives no answer while the planner's fault lasts.

@@ -52,6 +52,7 @@ class FlightRecorder final : private flight::Aircraft {
   [[nodiscard]] std::span<firmware_if::DepthCamera* const> cameras() noexcept { return cameras_; }
   [[nodiscard]] std::span<firmware_if::Lidar* const> lidars() noexcept { return lidars_; }
   void decided(const flight::DecisionOutput& decision) noexcept;
+  void braked() noexcept { add(RecordKind::kNearBrake); }
   void gave_up() noexcept { add(RecordKind::kGiveUp); }
   void gave_goals(std::span<const Vector3> goals_W) noexcept;
   /// What is left, and the totals. Nothing may follow.

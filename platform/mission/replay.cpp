@@ -448,6 +448,10 @@ void Replay::step(const std::function<void(const log::DecisionEntry&)>& decided)
       decided(entry);
     }
   }
+  if (recording_.kind() == RecordKind::kNearBrake) {
+    flight_.system().flight_program().brake_for_near();
+    recording_.next();
+  }
   if (recording_.kind() == RecordKind::kGiveUp) {
     flight_.system().decision_program().give_up();
     recording_.next();

@@ -51,6 +51,7 @@ std::string to_json(const MissionResult& r) {
   json["refused"] = Json::object();
   for (const RefusedRecord& refused : r.refused)
     json["refused"][refused.sensor][refused.reason] = refused.images;
+  json["near_brakes"] = r.near_brakes;
   json["map_drops"] = r.map_drops;
   if (r.suite) {
     json["possible"] = r.suite->possible;

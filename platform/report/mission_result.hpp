@@ -82,6 +82,7 @@ struct MissionResult {
   std::vector<GoalRecord> goals;  ///< One more key, or none: a mission with the world's goal alone.
   /// By sensor, then reason; in JSON {"camera 1": {"fog": 3}}.
   std::vector<RefusedRecord> refused;
+  std::uint64_t near_brakes{};       ///< Braked between two decisions, for what was near in the way.
   std::uint64_t map_drops{};         ///< The map was dropped: what was seen lay elsewhere.
   std::optional<SuiteFlight> suite;  ///< Three more keys, or none.
 };

@@ -59,6 +59,7 @@ std::optional<MissionResult> from_line(const std::string& line) {
     if (json.contains("refused"))  // results of before have none
       for (const auto& [sensor, reasons] : json.at("refused").items())
         for (const auto& [reason, images] : reasons.items()) r.refused.push_back({sensor, reason, images});
+    r.near_brakes = json.value("near_brakes", std::uint64_t{0});
     r.map_drops = json.value("map_drops", std::uint64_t{0});
     if (json.contains("possible"))
       r.suite = SuiteFlight{json.at("possible"), number(json.at("shortest_m")), json.at("command")};

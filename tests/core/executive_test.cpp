@@ -239,7 +239,7 @@ TEST(LaneExecutive, TellsTheTraceEverySlot) {
     EXPECT_EQ(event.overrun, event.slot == SlotId::kCommit);
   }
   EXPECT_EQ(slots, (std::vector<SlotId>{SlotId::kWorld, SlotId::kSense, SlotId::kCommit, SlotId::kTrack,
-                                        SlotId::kPublish}));
+                                        SlotId::kPublish, SlotId::kLook}));
   EXPECT_TRUE(event.is_frame) << "after its pieces";
   EXPECT_EQ(event.end - event.begin, us(101));
 }

@@ -95,8 +95,9 @@ int fly() {
   mission::FlightSetup setup(flight, config.backends, mission::image_limits(config), own);
   core::VirtualClock clock;
   core::ClockMeter meter;  // on a clock that stands still while a slot runs: no budget is ever spent
-  const auto system = std::make_unique<flight::FlightSystem>(flight, meter, aircraft, cameras.cameras(),
-                                                             setup.parts(), setup.arena(), cameras.lidars());
+  const auto system =
+      std::make_unique<flight::FlightSystem>(flight, meter, aircraft, cameras.cameras(),
+                                             setup.parts(cameras.watched()), setup.arena(), cameras.lidars());
   setup.check();
   flight::WatchdogProgram watchdog;
   core::Reactions reactions;

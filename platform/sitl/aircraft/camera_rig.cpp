@@ -18,20 +18,24 @@ SensorRig rig_of(const SimulatorConfig& config) noexcept {
 CameraRig::CameraRig(const World& world, const SimulatorConfig& config, std::uint64_t seed) {
   const SensorRig rig = rig_of(config);
   camera_.reserve(rig.cameras.size());
+  watched_camera_.reserve(rig.cameras.size());
   for (std::size_t i = 0; i < rig.cameras.size(); ++i)
-    camera_.emplace_back(world, rig.cameras[i], camera_mount(rig.cameras[i].mount), config.camera, seed,
-                         static_cast<std::uint32_t>(i));
+    for (std::vector<SimulatedDepthCamera>* of : {&camera_, &watched_camera_})
+      of->emplace_back(world, rig.cameras[i], camera_mount(rig.cameras[i].mount), config.camera, seed,
+                       static_cast<std::uint32_t>(i));
   lidar_.reserve(rig.lidars.size());
   for (std::size_t i = 0; i < rig.lidars.size(); ++i)
     lidar_.emplace_back(world, rig.lidars[i],
                         i < config.lidar_patterns.size() ? config.lidar_patterns[i] : std::vector<LidarRay>{},
                         config.lidar, seed, static_cast<std::uint32_t>(i));
   for (SimulatedDepthCamera& camera : camera_) cameras_.push_back(&camera);
+  for (SimulatedDepthCamera& camera : watched_camera_) watched_.push_back(&camera);
   for (SimulatedLidar& lidar : lidar_) lidars_.push_back(&lidar);
 }
 
 void CameraRig::expose(MonotonicTime now, const Pose& X_WB) noexcept {
   for (SimulatedDepthCamera& camera : camera_) camera.expose(now, X_WB);
+  for (SimulatedDepthCamera& camera : watched_camera_) camera.expose(now, X_WB);
   for (SimulatedLidar& lidar : lidar_) lidar.expose(now, X_WB);
 }
 
@@ -40,10 +44,12 @@ CameraServer::CameraServer(const World& world, const SimulatorConfig& config, st
   const SensorRig rig = rig_of(config);
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     const std::size_t pixels = std::size_t{rig.cameras[i].width} * rig.cameras[i].height;
-    Served& served = served_.emplace_back();
-    served.mount_ = rig_.cameras()[i]->mount();
-    for (std::size_t cell = 0; cell < 3; ++cell) served.box.cell(cell).depth_m.assign(pixels, 0.0F);
-    cameras_.push_back(&served);
+    for (std::deque<Served>* to : {&served_, &served_watched_}) {
+      Served& served = to->emplace_back();
+      served.mount_ = rig_.cameras()[i]->mount();
+      for (std::size_t cell = 0; cell < 3; ++cell) served.box.cell(cell).depth_m.assign(pixels, 0.0F);
+      (to == &served_ ? cameras_ : watched_).push_back(&served);
+    }
   }
   for (std::size_t i = 0; i < rig.lidars.size(); ++i) {
     ServedLidar& served = served_lidar_.emplace_back();
@@ -70,11 +76,13 @@ void CameraServer::run(core::SlotId, core::LaneExecutive& lane) noexcept {
 void CameraServer::serve(std::size_t camera, core::Work& work) noexcept {
   firmware_if::DepthFrame frame;
   if (rig_.cameras()[camera]->read(frame) != Status::kOk) return;
-  Image& image = served_[camera].box.draft();
-  std::copy(frame.depth_m.begin(), frame.depth_m.end(), image.depth_m.begin());
-  image.frame = frame;
-  image.frame.depth_m = image.depth_m;
-  served_[camera].box.publish();
+  for (Served* to : {&served_[camera], &served_watched_[camera]}) {
+    Image& image = to->box.draft();
+    std::copy(frame.depth_m.begin(), frame.depth_m.end(), image.depth_m.begin());
+    image.frame = frame;
+    image.frame.depth_m = image.depth_m;
+    to->box.publish();
+  }
   work.units += frame.depth_m.size();
 }
 

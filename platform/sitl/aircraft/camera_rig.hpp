@@ -22,13 +22,15 @@ class CameraRig final : public ExposureSink {
   /// In the order of the rig.
   [[nodiscard]] std::span<firmware_if::DepthCamera* const> cameras() noexcept { return cameras_; }
   [[nodiscard]] std::span<firmware_if::Lidar* const> lidars() noexcept { return lidars_; }
+  /// The same cameras, the same images, for another reader.
+  [[nodiscard]] std::span<firmware_if::DepthCamera* const> watched() noexcept { return watched_; }
   /// Most points of a sweep.
   [[nodiscard]] std::size_t rays(std::size_t lidar) const noexcept { return lidar_[lidar].rays(); }
 
  private:
-  std::vector<SimulatedDepthCamera> camera_;
+  std::vector<SimulatedDepthCamera> camera_, watched_camera_;
   std::vector<SimulatedLidar> lidar_;
-  std::vector<firmware_if::DepthCamera*> cameras_;
+  std::vector<firmware_if::DepthCamera*> cameras_, watched_;
   std::vector<firmware_if::Lidar*> lidars_;
 };
 
@@ -42,6 +44,8 @@ class CameraServer final : public ExposureSink, public core::LaneProgram {
   void run(core::SlotId slot, core::LaneExecutive& lane) noexcept override;
   /// For the decision lane.
   [[nodiscard]] std::span<firmware_if::DepthCamera* const> cameras() noexcept { return cameras_; }
+  /// The same images, for the flight lane.
+  [[nodiscard]] std::span<firmware_if::DepthCamera* const> watched() noexcept { return watched_; }
   [[nodiscard]] std::span<firmware_if::Lidar* const> lidars() noexcept { return lidars_; }
   /// Poses lost because the background lane did not keep up; never decreases.
   [[nodiscard]] std::uint64_t exposures_dropped() const noexcept { return exposure_.dropped(); }
@@ -81,9 +85,9 @@ class CameraServer final : public ExposureSink, public core::LaneProgram {
 
   const World& world_;
   CameraRig rig_;
-  std::deque<Served> served_;
+  std::deque<Served> served_, served_watched_;
   std::deque<ServedLidar> served_lidar_;
-  std::vector<firmware_if::DepthCamera*> cameras_;
+  std::vector<firmware_if::DepthCamera*> cameras_, watched_;
   std::vector<firmware_if::Lidar*> lidars_;
   core::SpscRing<Exposure, 2048> exposure_;
   double least_clearance_m_{2.0};

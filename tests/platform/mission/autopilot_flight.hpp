@@ -40,8 +40,9 @@ class AutopilotFlight {
         aircraft_(body_, config.flight.vehicle, config.flight.minor_frame,
                   companion_config(*config.autopilot, config.flight.vehicle)),
         cameras_(switched(rig_.cameras())),
+        watched_(switched(rig_.watched())),
         setup_(flight_config_, config.backends, image_limits(config)),
-        flight_(flight_config_, aircraft_, cameras_, setup_.parts(), setup_.arena(), rig_.lidars()) {
+        flight_(flight_config_, aircraft_, cameras_, setup_.parts(watched_), setup_.arena(), rig_.lidars()) {
     setup_.check();
     body_.stand_in(world);
   }
@@ -95,7 +96,7 @@ class AutopilotFlight {
   sitl::AutopilotAircraft aircraft_;
   bool runtime_runs_{true}, cameras_are_dead_{false};
   std::deque<SwitchedCamera> switches_;
-  std::vector<firmware_if::DepthCamera*> cameras_;
+  std::vector<firmware_if::DepthCamera*> cameras_, watched_;
   FlightSetup setup_;
   flight::LockstepFlight flight_;
 };

@@ -59,7 +59,8 @@ int early_stops(double cost_factor, double appears_s) {
 
 TEST(AlwaysAStop, IsFlownTwoMinorFramesAfterTheMapThatShowsTheWayBlocked) {
   int early = 0;
-  for (const double appears_s : {9.5, 10.0, 10.5, 11.0}) early += early_stops(0.15, appears_s);
+  // So far ahead that the flight lane's own look does not see it first.
+  for (const double appears_s : {7.5, 8.0, 8.5, 9.0}) early += early_stops(0.15, appears_s);
   EXPECT_GT(early, 0) << "otherwise nothing was in the way";
 }
 

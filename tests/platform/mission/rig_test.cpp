@@ -13,6 +13,8 @@
 #include "platform/mission/replay.hpp"
 #include "platform/sitl/world/generator.hpp"
 #include "platform/sitl/world/world_file.hpp"
+#include "platform/sitl/world/world_maker.hpp"
+#include "platform/vehicle/vehicle_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace roborun::mission {
@@ -194,6 +196,27 @@ TEST(SixCamerasWithHoles, LookCloselyWhereLeavingDidNotHelp) {
                 r.mission_time_s);
     EXPECT_TRUE(r.reached_goal) << r.reason;
     EXPECT_FALSE(r.collided);
+  }
+}
+
+TEST(ThinThings, BetweenTwoDecisionsAreBrakedFor) {
+  // A level wire of 2 cm that no decision saw before it was too late: both flights ended in it. Decisions take up to 4.6 s here.
+  for (const std::uint64_t seed : {134U, 178U}) {
+    const sitl::World world(sitl::make_world(sitl::WorldKind::kWires, seed, {}));
+    MissionConfig config;
+    config.flight.costs = board::paper().costs;
+    config.flight.model = board::paper().model;
+    set_vehicle(config, vehicle::load_vehicle("paper-d455"));
+    config.seed = seed;
+    config.log = test::scratch("wires.mcap");
+    const report::MissionResult r = fly_mission(world, config, {}).result;
+    std::printf("seed %u: %s after %.0f s, braked %u times\n", static_cast<unsigned>(seed), r.reason.c_str(),
+                r.mission_time_s, static_cast<unsigned>(r.near_brakes));
+    EXPECT_TRUE(r.reached_goal) << r.reason;
+    EXPECT_FALSE(r.collided);
+    EXPECT_GT(r.near_brakes, 0U);
+    const ReplayResult replayed = replay_flight(config.log, {});
+    EXPECT_TRUE(replayed.same()) << "after " << replayed.seconds << " s";
   }
 }
 

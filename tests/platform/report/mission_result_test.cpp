@@ -48,10 +48,12 @@ TEST(MissionResult, CountsRefusedImagesBySensorAndReasonAndReadsThemBack) {
   MissionResult r = test::sample_mission("aware", 4.0).result;
   EXPECT_EQ(nlohmann::json::parse(to_json(r))["refused"], nlohmann::json::object()) << "none";
   r.refused = {{"camera 1", "fog", 3}, {"camera 1", "turned", 1}, {"lidar 1", "stamp", 2}};
+  r.near_brakes = 3;
   r.map_drops = 4;
   const auto json = nlohmann::json::parse(to_json(r));
   EXPECT_EQ(json["refused"]["camera 1"]["fog"], 3);
   EXPECT_EQ(json["refused"]["lidar 1"]["stamp"], 2);
+  EXPECT_EQ(json["near_brakes"], 3);
   EXPECT_EQ(json["map_drops"], 4);
   r.map = r.planner = "own";
   const auto back = from_line(to_line(r));
