@@ -605,10 +605,10 @@ report::AuditReport RealTimeRun::run(const std::function<void(double)>& progress
 }  // namespace
 
 std::size_t traced_bytes(const RealTimeConfig& config) {
-  // Events a second: a frame and five slots of the flight lane, two and a half of the decision lane's frame, which
+  // Events a second: a frame and six slots of the flight lane, two and a half of the decision lane's frame, which
   // mostly has one slot, and those of background and watchdog. What does not fit is counted as lost.
   const double rate_Hz = 1.0 / seconds(config.mission.flight.minor_frame);
-  return static_cast<std::size_t>((config.seconds + 2.0) * (9.0 * rate_Hz + 500.0)) *
+  return static_cast<std::size_t>((config.seconds + 2.0) * (10.0 * rate_Hz + 500.0)) *
          sizeof(core::TraceEvent);
 }
 
