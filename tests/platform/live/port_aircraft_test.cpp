@@ -111,6 +111,24 @@ TEST_F(PortAircraftTest, IsReadyOnceEverythingIsHeard) {
   EXPECT_NEAR(sut.health(feeder.now).battery_ratio, 0.9, 0.011);
 }
 
+TEST_F(PortAircraftTest, HasEachImageForBothOfItsReaders) {
+  look();
+  ASSERT_EQ(sut.watched().size(), 1U);
+  EXPECT_EQ(sut.watched()[0]->mount().p_BC_m, feeder.mount_.p_BC_m) << "known before the flight";
+  for (int i = 0; i < 20; ++i) feeder.step();
+  firmware_if::DepthFrame decision, watch;
+  ASSERT_EQ(sut.cameras()[0]->read(decision), Status::kOk);
+  ASSERT_EQ(sut.watched()[0]->read(watch), Status::kOk);
+  EXPECT_EQ(watch.stamp, decision.stamp);
+  EXPECT_EQ(watch.sequence, decision.sequence);
+  EXPECT_NE(watch.depth_m.data(), decision.depth_m.data()) << "each in its own memory";
+  EXPECT_EQ(sut.watched()[0]->read(watch), Status::kNotReady);
+  for (int i = 0; i < 20; ++i) feeder.step();
+  EXPECT_EQ(sut.watched()[0]->read(watch), Status::kOk);
+  EXPECT_GT(watch.sequence, decision.sequence) << "one does not wait for the other";
+  EXPECT_EQ(sut.cameras()[0]->read(decision), Status::kOk);
+}
+
 TEST_F(PortAircraftTest, SaysWhichPortIsNotThere) {
   std::remove((name + "-gnss").c_str());
   look();
