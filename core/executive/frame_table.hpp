@@ -71,7 +71,7 @@ inline constexpr Nanos kWatchdogPatience{100'000'000};
 inline constexpr Nanos kMinorFrame{2'500'000};
 
 /// The rates at which the flight lane may run: 100 to 400 Hz with a minor frame of whole microseconds, hence
-/// 100, 125, 160, 200, 250, 320 and 400. No faster: the budgets below fill two thirds of 2.5 ms, ESC commands leave
+/// 100, 125, 160, 200, 250, 320 and 400. No faster: the budgets below fill three quarters of 2.5 ms, ESC commands leave
 /// at 400 Hz at most (firmware_if/transmit_gate.hpp), and the estimator remembers 200 samples. No slower: not
 /// flown (Mission.FliesAtEveryRateOfTheFlightLane).
 [[nodiscard]] constexpr bool is_flight_rate(int rate_Hz) noexcept {
@@ -109,7 +109,7 @@ inline constexpr std::array<SlotSpec, kSlotCount> kFrameTable = [] {
     {SlotId::kCommit,      "commit",       L::kFlight,      us(100), P::kBrake,      3, false},  // takes trajectories
     {SlotId::kTrack,       "track",        L::kFlight,      us(200), P::kStop,     400, true},   // tracker, mixer, motors
     {SlotId::kPublish,     "publish",      L::kFlight,      us(200), P::kSkip,       1, false},  // to the other lanes
-    {SlotId::kLook,        "look",         L::kFlight,      us(300), P::kSkip,       1, false},  // between two decisions, at what is near
+    {SlotId::kLook,        "look",         L::kFlight,      us(600), P::kSkip,       1, false},  // between two decisions, at what is near
 
     {SlotId::kGather,      "gather",       L::kDecision,    ms(20),  P::kDegrade,    1, false},  // newest frames and state
     {SlotId::kPointCloud,  "point_cloud",  L::kDecision,    ms(1500), P::kDegrade,   1, true},   // four times the slowest board known

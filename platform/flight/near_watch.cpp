@@ -46,22 +46,22 @@ bool NearWatch::way_W(const Input& in, Way& way) const noexcept {
   return true;
 }
 
-bool NearWatch::take_image(const Input& in) noexcept {
+void NearWatch::take_image(const Input& in) noexcept {
   camera_ = (camera_ + 1) % cameras_.size();
-  if (((in.refused >> camera_) & 1U) != 0 || in.now - read_[camera_] < kEvery) return false;
+  if (((in.refused >> camera_) & 1U) != 0 || in.now - read_[camera_] < kEvery) return;
   firmware_if::DepthCamera& camera = *cameras_[camera_];
   Way way;
   Pose X_WB;
-  if (!way_W(in, way) || in.past.pose_at(in.now - kAgo, X_WB) != Status::kOk) return false;
+  if (!way_W(in, way) || in.past.pose_at(in.now - kAgo, X_WB) != Status::kOk) return;
   const Vector3 end_C = core::camera_pose(X_WB, camera.mount()).inverse_times(way.back());
-  if (end_C.x() < kAlong * end_C.norm()) return false;
+  if (end_C.x() < kAlong * end_C.norm()) return;
   read_[camera_] = in.now;
   firmware_if::DepthFrame frame;
-  if (camera.read(frame) != Status::kOk || in.past.pose_at(frame.stamp, X_WB) != Status::kOk) return false;
+  if (camera.read(frame) != Status::kOk || in.past.pose_at(frame.stamp, X_WB) != Status::kOk) return;
   stages::PosedDepthFrame posed;
   posed.frame = frame;
   posed.X_WC = core::camera_pose(X_WB, camera.mount());
-  if (stages::check_shape(posed) != Status::kOk) return false;
+  if (stages::check_shape(posed) != Status::kOk) return;
   swept_.points = 0;
   for (const Vector3& p_W : way) {
     const Vector3 p_C = posed.X_WC.inverse_times(p_W);
@@ -75,13 +75,16 @@ bool NearWatch::take_image(const Input& in) noexcept {
   frame_ = frame;
   row_ = in_the_way_ = 0;
   committed_number_ = in.committed_number;
-  return true;
 }
 
 bool NearWatch::must_brake(const Input& in) noexcept {
-  if (in.committed_number != committed_number_) row_ = frame_.height;
-  if (std::max(in.now, in.due) - in.looked < kOften || cameras_.size() == 0) return false;
-  if (row_ >= frame_.height && !take_image(in)) return false;
+  const bool is_idle = std::max(in.now, in.due) - in.looked < kOften || cameras_.size() == 0;
+  if (is_idle || in.committed_number != committed_number_) row_ = frame_.height;
+  if (is_idle) return false;
+  if (row_ >= frame_.height) {
+    take_image(in);  // is enough for one frame
+    return false;
+  }
   const std::size_t rows = kAtOnce / frame_.width;  // at least twelve: check_shape()
   const std::size_t end = std::min<std::size_t>(row_ + rows, frame_.height);
   in_the_way_ += stages::count_swept(frame_, row_, end, swept_);

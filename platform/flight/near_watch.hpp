@@ -45,16 +45,16 @@ class NearWatch {
     std::uint64_t committed_number{};
     const stages::PastStates& past;
   };
-  /// Once a minor frame. Reads one image at most, and looks at some of its rows. RT-safe: O(1), no allocation; a read costs what the
-  /// device takes.
+  /// Once a minor frame. Reads one image at most, or looks at some rows of the last one. RT-safe: O(1), no allocation; a read costs what
+  /// the device takes.
   [[nodiscard]] bool must_brake(const Input& in) noexcept;
 
  private:
   using Way = std::array<Vector3, stages::SweptWay::kMost>;
   /// Where it would go, world frame. False: it stands.
   [[nodiscard]] bool way_W(const Input& in, Way& way) const noexcept;
-  /// The next camera, if it looks along the way: its newest image. False: none is due.
-  [[nodiscard]] bool take_image(const Input& in) noexcept;
+  /// The newest image of the next camera, if one is due and it looks along the way.
+  void take_image(const Input& in) noexcept;
 
   Config config_;
   core::StaticVector<firmware_if::DepthCamera*, kMostCameras> cameras_;
