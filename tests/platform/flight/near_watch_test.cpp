@@ -28,6 +28,7 @@ class WireCamera final : public firmware_if::DepthCamera {
     ++reads;
     if (!has_image_) return Status::kNotReady;
     has_image_ = false;
+    ++images;
     frame = {};
     frame.stamp = stamp_ - age;
     frame.width = frame.height = pixels_;
@@ -47,7 +48,7 @@ class WireCamera final : public firmware_if::DepthCamera {
     stamp_ = stamp;
     has_image_ = true;
   }
-  int reads{0};
+  int reads{0}, images{0};
   std::optional<int> few;
   Nanos age{};                ///< The stamp is so much older than the image.
   std::size_t pixels_lost{};  ///< Of the image's memory.
@@ -236,6 +237,29 @@ TEST_F(Near, AnImageSaysNothingOfAPathThatWasCommittedLater) {
   EXPECT_TRUE(brakes_at_m(6.0)) << "of one piece";
   camera_ = {WireCamera(640)};
   EXPECT_FALSE(brakes_at_m(6.0));
+}
+
+TEST_F(Near, LeavesAnImageThatItBeganBeforeDecisionsLookedOften) {
+  for (const bool is_interrupted : {false, true}) {
+    WireCamera camera(640);
+    std::vector<firmware_if::DepthCamera*> cameras{&camera};
+    NearWatch watch(config_, cameras);
+    stages::PastStates past(Nanos{500'000'000});
+    bool brakes = false;
+    int since = 0;
+    for (std::int64_t i = 1; i <= 100; ++i) {
+      const MonotonicTime now{i * kFrame};
+      const TrajectoryPoint at = flown_.at(now);
+      past.add({now, at.p_W, at.v_W, Quaternion::Identity()});
+      if (i == 4) camera.expose(now, 1.0, above_m_);
+      since += camera.images;
+      const bool looks_often = is_interrupted && since == 5;
+      const MonotonicTime looked = looks_often ? now : now - Nanos{1'000'000'000};
+      brakes = watch.must_brake({now, looked, looked + Nanos{50'000'000}, 0, flown_, 1, past}) || brakes;
+    }
+    EXPECT_GT(since, 20);
+    EXPECT_EQ(brakes, !is_interrupted);
+  }
 }
 
 TEST_F(Near, TakesNoImageThatIsOldOrOfAnotherSize) {
