@@ -179,7 +179,11 @@ void DecisionProgram::report_depth(MonotonicTime now) noexcept {
     report_.depth_sensor = static_cast<std::uint8_t>(sensor);
     report_.depth_fault = last_fault_[sensor];
   };
-  for (std::size_t i = 0; i < cameras_.size(); ++i) consider(i);
+  report_.refused = 0;
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    consider(i);
+    if (last_fault_[i] != stages::FrameFault::kNone) report_.refused |= 1U << i;
+  }
   for (std::size_t i = 0; i < lidars_.size(); ++i) consider(kMostCameras + i);
 }
 
@@ -197,11 +201,6 @@ void DecisionProgram::look(const FlightReport& report, MonotonicTime now) noexce
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     const std::size_t sensor = sensor_of_[i];
     note(i, report.airborne, now);
-    if (sensor < kMostCameras) {
-      const std::uint32_t bit = 1U << sensor;
-      report_.refused =
-          fault_[i] == stages::FrameFault::kNone ? report_.refused & ~bit : report_.refused | bit;
-    }
     if (fault_[i] != stages::FrameFault::kNone) continue;
     ++scan[sensor < kMostCameras ? 0 : 1 + sensor - kMostCameras];
     frames_[kept++] = frames_[i];

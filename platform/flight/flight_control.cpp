@@ -229,7 +229,7 @@ TrajectoryPoint FlightControl::next_reference(MonotonicTime now) {
   const double brake_mps2 = braking_mps2(vehicle_);
   const double rate = brake_rate_;
   const double speed_mps = committed_.at_s(brake_at_s_).v_W.norm();
-  brake_rate_ = std::max(rate - period_s_ * brake_mps2 / std::max(speed_mps, 1.0), 0.0);
+  brake_rate_ = std::max(rate - lost_rate(brake_mps2, speed_mps, period_s_), 0.0);
   brake_at_s_ += period_s_ * brake_rate_;
   TrajectoryPoint point = committed_.at_s(brake_at_s_);
   if (brake_rate_ <= 0.0 || brake_at_s_ >= committed_.duration_s()) {

@@ -2,6 +2,7 @@
 /// committed.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "core/trajectory.hpp"
@@ -20,6 +21,10 @@ namespace roborun::flight {
 
 /// FlightControl::brake() slows down by so much.
 [[nodiscard]] double braking_mps2(const VehicleModel& vehicle) noexcept;
+/// What the rate along the path loses meanwhile in `step_s`, where the path itself is flown at `speed_mps`.
+[[nodiscard]] inline double lost_rate(double braking_mps2, double speed_mps, double step_s) noexcept {
+  return step_s * braking_mps2 / std::max(speed_mps, 1.0);
+}
 
 /// The set-point time-out of PX4 and ArduCopter as they are asked to be.
 inline constexpr Nanos kAutopilotSilent{500'000'000};

@@ -40,7 +40,7 @@ struct DecisionReport {
   bool heard{false};
   MonotonicTime due{};      ///< When it wants to be back.
   MonotonicTime looked{};   ///< When it read its images last.
-  std::uint32_t refused{};  ///< Bit i: what it got then of camera i was not believed.
+  std::uint32_t refused{};  ///< Bit i: the newest image of camera i was not believed.
   double depth_age_s{};
   /// The camera, or kMostCameras + the LiDAR, whose images are the oldest usable ones, and what was wrong with the newest; kNone:
   /// there was none.

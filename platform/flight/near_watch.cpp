@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/geometry/camera_pose.hpp"
+#include "platform/flight/flight_control.hpp"
 #include "stages/perception/frame_guard.hpp"
 
 namespace roborun::flight {
@@ -33,7 +34,7 @@ bool NearWatch::way_W(const Input& in, Way& way) const noexcept {
   double at_s = begin_s + kReacts_s, rate = 1.0, room_m = kRoom_m;
   for (int walks = 0; walks < kMostWalks && room_m > 0.0 && at_s < end_s; ++walks) {
     const double speed_mps = in.committed.at_s(at_s).v_W.norm();
-    rate -= kWalk_s * config_.braking_mps2 / std::max(speed_mps, 1.0);
+    rate -= lost_rate(config_.braking_mps2, speed_mps, kWalk_s);
     if (rate <= 0.0) room_m -= kWalk_s * speed_mps;
     at_s += kWalk_s * (rate > 0.0 ? rate : 1.0);
   }

@@ -239,7 +239,7 @@ MissionRun::MissionRun(const sitl::World& world, const MissionConfig& config)
       config_(checked(world, config)),
       flight_config_(flight_config_of(world, config)),
       faults_(config),
-      rig_(world, config.simulator, config.seed),
+      rig_(world, config.simulator, config.seed, sitl::Readers::kTwo),
       aircraft_(flight_config_.vehicle, config.simulator, ground_below(world), config.seed,
                 config.flight.minor_frame, rig_),
       autopilot_(config.autopilot ? std::make_unique<sitl::AutopilotAircraft>(

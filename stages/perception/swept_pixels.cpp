@@ -63,7 +63,7 @@ std::size_t count_swept_lanes(const firmware_if::DepthFrame& frame, std::size_t 
       if (hn::AllFalse(d, is_near)) continue;
       const auto left = hn::Add(hn::Set(d, frame.tan_half_width - across * (static_cast<float>(u) + 0.5F)),
                                 hn::Mul(step, hn::Iota(d, 0.0F)));
-      const auto y = hn::Mul(z, left), x_up = hn::Mul(z, up);
+      const auto y = hn::Mul(z, left), height = hn::Mul(z, up);
       const auto square = [](auto a, auto b, auto c) {
         return hn::Add(hn::Add(hn::Mul(a, a), hn::Mul(b, b)), hn::Mul(c, c));
       };
@@ -71,7 +71,7 @@ std::size_t count_swept_lanes(const firmware_if::DepthFrame& frame, std::size_t 
       for (std::size_t i = 0; i + 1 < way.points; ++i) {
         const Piece& p = piece[i];
         const auto dx = hn::Sub(z, hn::Set(d, p.from[0])), dy = hn::Sub(y, hn::Set(d, p.from[1])),
-                   dz = hn::Sub(x_up, hn::Set(d, p.from[2]));
+                   dz = hn::Sub(height, hn::Set(d, p.from[2]));
         if (i == 0) begin2 = square(dx, dy, dz);
         const auto bx = hn::Set(d, p.by[0]), by = hn::Set(d, p.by[1]), bz = hn::Set(d, p.by[2]);
         const auto dot = hn::Add(hn::Add(hn::Mul(dx, bx), hn::Mul(dy, by)), hn::Mul(dz, bz));

@@ -15,14 +15,16 @@ SensorRig rig_of(const SimulatorConfig& config) noexcept {
   return rig;
 }
 
-CameraRig::CameraRig(const World& world, const SimulatorConfig& config, std::uint64_t seed) {
+CameraRig::CameraRig(const World& world, const SimulatorConfig& config, std::uint64_t seed, Readers readers) {
   const SensorRig rig = rig_of(config);
-  camera_.reserve(rig.cameras.size());
-  watched_camera_.reserve(rig.cameras.size());
-  for (std::size_t i = 0; i < rig.cameras.size(); ++i)
-    for (std::vector<SimulatedDepthCamera>* of : {&camera_, &watched_camera_})
-      of->emplace_back(world, rig.cameras[i], camera_mount(rig.cameras[i].mount), config.camera, seed,
-                       static_cast<std::uint32_t>(i));
+  const auto make_cameras = [&](std::vector<SimulatedDepthCamera>& cameras) {
+    cameras.reserve(rig.cameras.size());
+    for (std::size_t i = 0; i < rig.cameras.size(); ++i)
+      cameras.emplace_back(world, rig.cameras[i], camera_mount(rig.cameras[i].mount), config.camera, seed,
+                           static_cast<std::uint32_t>(i));
+  };
+  make_cameras(camera_);
+  if (readers == Readers::kTwo) make_cameras(watched_camera_);
   lidar_.reserve(rig.lidars.size());
   for (std::size_t i = 0; i < rig.lidars.size(); ++i)
     lidar_.emplace_back(world, rig.lidars[i],

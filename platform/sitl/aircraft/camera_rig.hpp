@@ -14,15 +14,19 @@
 
 namespace roborun::sitl {
 
+/// Who reads the cameras of a rig: the decision lane alone, or the flight lane, too.
+enum class Readers : std::uint8_t { kOne, kTwo };
+
 /// Lockstep: an exposure is taken at once, and rendered by whoever reads it.
 class CameraRig final : public ExposureSink {
  public:
-  CameraRig(const World& world, const SimulatorConfig& config, std::uint64_t seed);
+  CameraRig(const World& world, const SimulatorConfig& config, std::uint64_t seed,
+            Readers readers = Readers::kOne);
   void expose(MonotonicTime now, const Pose& X_WB) noexcept override;
   /// In the order of the rig.
   [[nodiscard]] std::span<firmware_if::DepthCamera* const> cameras() noexcept { return cameras_; }
   [[nodiscard]] std::span<firmware_if::Lidar* const> lidars() noexcept { return lidars_; }
-  /// The same cameras, the same images, for another reader.
+  /// The same cameras, the same images, for the second reader; none where there is one.
   [[nodiscard]] std::span<firmware_if::DepthCamera* const> watched() noexcept { return watched_; }
   /// Most points of a sweep.
   [[nodiscard]] std::size_t rays(std::size_t lidar) const noexcept { return lidar_[lidar].rays(); }

@@ -34,7 +34,7 @@ class AutopilotFlight {
  public:
   AutopilotFlight(const sitl::World& world, const MissionConfig& config)
       : flight_config_(flight_config_of(world, config)),
-        rig_(world, config.simulator, config.seed),
+        rig_(world, config.simulator, config.seed, sitl::Readers::kTwo),
         body_(flight_config_.vehicle, config.simulator, ground_below(world), config.seed,
               config.flight.minor_frame, rig_),
         aircraft_(body_, config.flight.vehicle, config.flight.minor_frame,
