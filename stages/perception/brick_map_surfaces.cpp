@@ -10,10 +10,6 @@ namespace {
 
 /// What is no wider may be a pole or a branch, but no body: half of the narrowest one.
 constexpr double kThinMost_m = 0.2;
-/// Surfaces differ by more than this at a step, besides the error of the depth.
-constexpr double kStep_m = 0.25;
-/// Of one surface neighbouring pixels differ by no more than this times their distance: it is seen under 10 degrees or more.
-constexpr double kSteepest = 5.7;
 /// Of the error of a camera that mixes pixels, what has to fit into a cell: its surfaces are wrong more often than noise alone
 /// would make them.
 constexpr double kMixedSigmas = 1.5;
@@ -215,10 +211,7 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work)
     const Vector3 origin = (camera.posed->X_WC.p_RT - corner_W_) / finest_m();
     const DepthError& error = camera.posed->error;
     mixes_ = mixes_ || error.mixes;
-    camera.kinds = {static_cast<float>(kStep_m + SightCamera::kSigmas * error.constant_m),
-                    static_cast<float>(SightCamera::kSigmas * error.quadratic_per_m), error.mixes,
-                    static_cast<float>(SightCamera::kSigmas * error.constant_m),
-                    static_cast<float>(kSteepest * std::max(camera.column_pitch, camera.row_pitch))};
+    camera.kinds = pixel_rules(frame, error);
     camera.exact_m = static_cast<float>(exact_reach_m(error, finest_m()));
     camera.thin_reach_m = std::min(
         camera.exact_m, static_cast<float>(kThinMost_m / std::max(camera.column_pitch, camera.row_pitch)));

@@ -7,9 +7,11 @@
 // After foreach_target.
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "stages/perception/pixel_kinds.hpp"
+#include "stages/perception/sight_camera.hpp"
 #include "stages/perception/vector_lanes.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -126,9 +128,11 @@ void tell_pixels_lanes(const firmware_if::DepthFrame& frame, std::size_t v, std:
     row.surely_thin[u / 64] |= sure << (u % 64);
     hn::StoreU(depth, d, row.depth_m.data() + u);
     if (!rules.mixes) continue;
-    // One neighbour that shares its surface may be another such pixel.
+    // One neighbour that shares its surface may be another such pixel. What is nearer may be across a hole, the other eye's shadow.
     const auto few_share = hn::Lt(count_around(here, above, below, shares), hn::Set(d, 1.5F));
-    const auto mixed = hn::And(few_share, any([&](auto n) { return hn::Lt(n, same_low); }));
+    const auto hole = hn::Not(hn::And(hn::Eq(left, left), hn::Eq(right, right)));
+    const auto at_a_rim = hn::Or(hole, any([&](auto n) { return hn::Lt(n, same_low); }));
+    const auto mixed = hn::And(few_share, at_a_rim);
     hn::StoreU(hn::IfThenZeroElse(hn::AndNot(thin, mixed), depth), d, row.depth_m.data() + u);
   }
 }
@@ -138,8 +142,24 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace roborun::stages {
+namespace {
+
+/// Surfaces differ by more than this at a step, besides the error of the depth.
+constexpr double kStep_m = 0.25;
+/// Of one surface neighbouring pixels differ by no more than this times their distance: it is seen under 10 degrees or more.
+constexpr float kSteepest = 5.7F;
+
+}  // namespace
 
 HWY_EXPORT(tell_pixels_lanes);
+
+PixelRules pixel_rules(const firmware_if::DepthFrame& frame, const DepthError& error) noexcept {
+  const float pitch = 2.0F * std::max(frame.tan_half_width / static_cast<float>(frame.width),
+                                      frame.tan_half_height / static_cast<float>(frame.height));
+  return {static_cast<float>(kStep_m + SightCamera::kSigmas * error.constant_m),
+          static_cast<float>(SightCamera::kSigmas * error.quadratic_per_m), error.mixes,
+          static_cast<float>(SightCamera::kSigmas * error.constant_m), kSteepest * pitch};
+}
 
 void tell_pixels(const firmware_if::DepthFrame& frame, std::size_t v, std::size_t u0, std::size_t u1,
                  const PixelRules& rules, PixelRow& row) noexcept {

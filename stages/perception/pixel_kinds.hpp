@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/depth_error.hpp"
 #include "firmware_if/depth_camera.hpp"
 #include "stages/perception/depth_steps.hpp"
 
@@ -18,12 +19,15 @@ struct PixelRules {
   /// same_m + slope z + quadratic_per_m z^2, either.
   float same_m{}, slope{};
 };
+/// Those of a camera with this error.
+[[nodiscard]] PixelRules pixel_rules(const firmware_if::DepthFrame& frame, const DepthError& error) noexcept;
 
 /// Some pixels of a row.
 struct PixelRow {
   static constexpr std::size_t kPad = 8;  ///< Room for whole vectors.
-  /// 0: no surface, or, of a camera that mixes, a pixel that is not thin, beside one that is nearer, and shares its surface with
-  /// one neighbour at most: it saw a bit of what is in front and a bit of what is behind, and nothing is where it ends.
+  /// 0: no surface, or, of a camera that mixes, a pixel that is not thin, beside one that is nearer or, to the left or right, has
+  /// no information, and shares its surface with one neighbour at most: it saw a bit of what is in front and a bit of what is
+  /// behind, and nothing is where it ends.
   alignas(32) std::array<float, kMaxImageSide + kPad> depth_m{};
   /// Bit i of all words: pixel i is nearer than both pixels beside it, or above and below it, by a step. (One of them may have
   /// no information.) Of a camera that mixes it must not be alone, nor beside one that is nearer: such pixels lie anywhere

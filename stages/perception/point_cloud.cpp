@@ -80,6 +80,8 @@ bool PointCloud::add_row(const Row& row, double cell_m, Wanted& wanted) noexcept
   const auto range_m = static_cast<double>(frame.range_m);
   const double above_m = std::fmax(high_m_ - from_W.z(), 0.0), below_m = std::fmax(from_W.z() - low_m_, 0.0);
   const float* const raw = frame.depth_m.data() + row.v * frame.width;
+  const bool mixes = row.posed.error.mixes;
+  if (mixes) tell_pixels(frame, row.v, 0, frame.width, row.rules, pixels_);
   bool room = true;
   for (std::size_t u = 0; u < frame.width; ++u) {
     const bool is_value = raw[u] > frame.range_min_m;
@@ -87,7 +89,7 @@ bool PointCloud::add_row(const Row& row, double cell_m, Wanted& wanted) noexcept
     if (!is_value && !row.posed.error.dark_sky) continue;
     const Vector3 direction_W = row.posed.X_WC.R_RT * Vector3(1.0, row.y[u], row.z);
     double depth_m = is_value ? std::fmin(static_cast<double>(raw[u]), range_m) : range_m;
-    if (is_value && raw[u] < frame.range_m) {
+    if (is_value && raw[u] < frame.range_m && !(mixes && pixels_.depth_m[u] == 0.0F)) {
       const Vector3 p_W = from_W + depth_m * direction_W;
       if (wanted.includes(p_W) && !add(p_W, cell_m)) room = false;
     }
@@ -126,9 +128,11 @@ Status PointCloud::step(std::span<const PosedDepthFrame> frames, int level, cons
     for (int u = 0; u < frame.width; ++u)
       y[static_cast<std::size_t>(u)] = across - (u + 0.5) * 2.0 * across / frame.width;
     const double pixel_area = 4.0 * across * along / (frame.width * frame.height);
+    const PixelRules rules = pixel_rules(frame, posed.error);
     for (int v = 0; v < frame.height && !spent; ++v) {
       const double z = along - (v + 0.5) * 2.0 * along / frame.height;
-      if (!add_row({posed, static_cast<std::size_t>(v), z, y, pixel_area}, cell_m, wanted)) full = true;
+      if (!add_row({posed, static_cast<std::size_t>(v), z, y, pixel_area, rules}, cell_m, wanted))
+        full = true;
       work.units += frame.width;
       spent = budget.spent(work);
     }

@@ -12,6 +12,7 @@
 #include "core/precision.hpp"
 #include "stages/perception/frame_guard.hpp"
 #include "stages/perception/occupancy_map.hpp"
+#include "stages/perception/pixel_kinds.hpp"
 #include "stages/stage.hpp"
 
 namespace roborun::stages {
@@ -56,7 +57,8 @@ class PointCloud {
   /// Averages the surfaces of all frames in cells of cell_size_m(level) of the lattice. Bad frames (FrameGuard) are refused
   /// whole and counted; when three quarters of the grid are full, further new cells are dropped and counted
   /// (kCapacity). kInvalidArgument if no frame was usable. work.units counts pixels. RT-safe: O(pixels),
-  /// polls the budget every row: kBudgetSpent. Only pixels near to what `need` asks for go into the grid.
+  /// polls the budget every row: kBudgetSpent. Only pixels near to what `need` asks for go into the grid, and none that lies
+  /// between two depths (tell_pixels()).
   [[nodiscard]] Status step(std::span<const PosedDepthFrame> frames, int level, const CloudNeed& need,
                             core::StageBudget& budget, core::Work& work) noexcept;
   [[nodiscard]] Status step(std::span<const PosedDepthFrame> frames, int level, core::StageBudget& budget,
@@ -101,6 +103,7 @@ class PointCloud {
     double z;                   ///< Of the camera's direction, whose x is 1.
     std::span<const double> y;  ///< The same of each pixel.
     double pixel_area;          ///< Of the plane at depth 1.
+    PixelRules rules;
   };
   /// False if the grid was full.
   [[nodiscard]] bool add_row(const Row& row, double cell_m, Wanted& wanted) noexcept;
@@ -114,6 +117,7 @@ class PointCloud {
   std::span<std::uint32_t> used_;  ///< Grid entries to clear before the next step.
   core::PoolRecord& used_pool_;
   FrameGuard guard_{};
+  PixelRow pixels_{};
   std::size_t count_{0};
   double seen_volume_m3_{0.0};
   double low_m_{-std::numeric_limits<double>::infinity()};

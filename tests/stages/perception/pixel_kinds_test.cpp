@@ -89,6 +89,28 @@ TEST_F(PixelsBetween, AreNothingWhereWhatIsBehindHasNoDepth) {
   EXPECT_EQ(row(20).depth_m[32], 0.0F);
 }
 
+TEST_F(PixelsBetween, AreNothingWhereWhatIsInFrontIsAcrossAHole) {
+  for (std::size_t v = 0; v < kSide; ++v)
+    for (std::size_t u = 32; u < 36; ++u) at(u, v) = std::numeric_limits<float>::quiet_NaN();
+  at(36, 20) = 4.0F;
+  at(36, 40) = at(36, 41) = at(37, 40) = at(37, 41) = 4.0F;
+  EXPECT_EQ(row(20).depth_m[36], 0.0F);
+  EXPECT_EQ(row(20).depth_m[31], 2.0F) << "the rim itself is there";
+  EXPECT_EQ(row(40).depth_m[36], 4.0F) << "three neighbours share its surface";
+}
+
+TEST_F(PixelsBetween, AreNoPoleBesideItsShadow) {
+  for (std::size_t v = 0; v < kSide; ++v) {
+    at(45, v) = at(46, v) = 4.0F;
+    at(47, v) = std::numeric_limits<float>::quiet_NaN();
+    at(55, v) = 4.0F;
+    at(56, v) = std::numeric_limits<float>::quiet_NaN();
+  }
+  EXPECT_EQ(row(20).depth_m[45], 4.0F);
+  EXPECT_EQ(row(20).depth_m[46], 4.0F) << "two pixels wide";
+  EXPECT_EQ(row(20).depth_m[55], 4.0F) << "one pixel wide";
+}
+
 TEST_F(PixelsBetween, AreNothingAndNotThinWhereTwoOfThemAgree) {
   at(32, 20) = at(32, 21) = 4.0F;
   for (const std::size_t v : {20U, 21U}) {

@@ -109,5 +109,41 @@ TEST(PointCloud, NeededPointsAreThereInTheSameOrderWithAllTheirPixels) {
   EXPECT_GT(compared, 1000U);
 }
 
+/// A wall at 2 m to the left of the middle before one at 9 m, and along its rim pixels between both, of one row in three.
+class RimOfAWall : public ::testing::Test {
+ protected:
+  RimOfAWall() : depth_m_(static_cast<std::size_t>(kSide) * kSide, 9.0F) {
+    for (std::size_t v = 0; v < kSide; ++v) {
+      std::fill_n(depth_m_.begin() + static_cast<std::ptrdiff_t>(v * kSide), kSide / 2, 2.0F);
+      if (v % 3 == 1) depth_m_[v * kSide + kSide / 2] = 5.0F;
+    }
+  }
+  /// Points that are on neither wall, of a camera that mixes or does not.
+  std::size_t between(bool mixes) {
+    PosedDepthFrame posed;
+    posed.frame.depth_m = depth_m_;
+    posed.frame.width = posed.frame.height = kSide;
+    posed.frame.tan_half_width = posed.frame.tan_half_height = 1.0F;
+    posed.frame.range_m = 20.0F;
+    posed.error.mixes = mixes;
+    core::UnlimitedBudget unlimited;
+    core::Work work;
+    EXPECT_EQ(f_.all.step({&posed, 1}, 0, unlimited, work), Status::kOk);
+    return static_cast<std::size_t>(
+        std::count_if(f_.all.points().begin(), f_.all.points().end(),
+                      [](const CloudPoint& p) { return p.p_W.x() > 3.0 && p.p_W.x() < 8.0; }));
+  }
+
+ private:
+  static constexpr std::uint16_t kSide = 64;
+  Fixture f_;
+  std::vector<float> depth_m_;
+};
+
+TEST_F(RimOfAWall, PixelsBetweenTwoDepthsAreNoPoints) {
+  EXPECT_GT(between(false), 5U) << "of a camera that does not mix they are there";
+  EXPECT_EQ(between(true), 0U);
+}
+
 }  // namespace
 }  // namespace roborun::stages
