@@ -186,9 +186,6 @@ class BrickMap final : public OccupancyMap, private MapView {
   /// The pixels [u0, u1) of row v.
   void add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_t u0, std::size_t u1,
                   core::Work& work) noexcept;
-  /// Whether a pixel of a camera that mixes, which ends in this free cell, is a surface that is known, within its error: noise puts it
-  /// before or behind where it is. What is seen more exactly than half a cell is where it is seen.
-  [[nodiscard]] bool is_known_surface(const SurfaceCamera& camera, const Cell& cell) const noexcept;
   /// The cells in row_.
   void add_cells(const SurfaceCamera& camera, bool vague, core::Work& work) noexcept;
   /// Those of pixels_ that show something thin, but for what lately moved there.

@@ -13,8 +13,6 @@ constexpr double kThinMost_m = 0.2;
 /// Of the error of a camera that mixes pixels, what has to fit into a cell: its surfaces are wrong more often than noise alone
 /// would make them.
 constexpr double kMixedSigmas = 1.5;
-/// A pixel is taken for a known surface so many cells before or behind where it ends, at most.
-constexpr int kMostOff = 3;
 constexpr int kTileLevel = 2;  // where a tile may end is known in cells of this size
 constexpr std::int32_t kTileCells = 1 << (kBrickLevel - kTileLevel);  // of a brick's edge
 
@@ -67,28 +65,6 @@ void BrickMap::add_pixels(const SurfaceCamera& camera, std::size_t v, std::size_
   if (pixels_.any_thin) add_thin_pixels(camera, line);
 }
 
-bool BrickMap::is_known_surface(const SurfaceCamera& camera, const Cell& cell) const noexcept {
-  const Vector3 center(cell.x + 0.5, cell.y + 0.5, cell.z + 0.5);
-  const Vector3 way = center - (camera.posed->X_WC.p_RT - corner_W_) / finest_m();  // in cells
-  const DepthError& error = camera.posed->error;
-  const double distance_m = finest_m() * way.norm();
-  const double error_m = error.at_m(distance_m) + error.place_m + error.angle_rad * distance_m;
-  const double reach = SightCamera::kSigmas * error_m / finest_m();
-  if (reach < 0.5) return false;
-  const Vector3 step = way / way.cwiseAbs().maxCoeff();
-  const int steps = std::min(static_cast<int>(std::ceil(reach)), kMostOff);
-  for (int k = -steps; k <= steps; ++k) {
-    const Vector3 p_W = corner_W_ + finest_m() * (center + k * step);
-    Cell at{};
-    if (!cell_of(p_W, at)) continue;
-    const Brick* brick = brick_at(slot_of(at.x >> kBrickLevel, at.y >> kBrickLevel, at.z >> kBrickLevel));
-    if (brick == nullptr) continue;
-    if (brick->cell(morton3(in_brick(at.x), in_brick(at.y), in_brick(at.z))) >= evidence::kSureFrom)
-      return true;
-  }
-  return false;
-}
-
 void BrickMap::add_cells(const SurfaceCamera& camera, bool vague, core::Work& work) noexcept {
   std::size_t last_position = slot_.size();
   Brick* brick = nullptr;
@@ -103,7 +79,6 @@ void BrickMap::add_cells(const SurfaceCamera& camera, bool vague, core::Work& wo
     }
     if (brick == nullptr) continue;
     const std::uint32_t morton = morton3(in_brick(cell.x), in_brick(cell.y), in_brick(cell.z));
-    if (mixes_ && brick->cell(morton) == evidence::kFree && is_known_surface(camera, cell)) continue;
     if (vague)
       brick->add_vague_hit(morton);
     else

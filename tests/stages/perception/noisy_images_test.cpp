@@ -281,31 +281,6 @@ TEST_F(NoisyImages, SurfacesOfAMixingCameraNeedMoreEvidence) {
 }
 
 /// A pole of 5 cm at 5 m, met by every third image, with noise, with pixels that mix it with what is behind.
-/// A wall at 8 m that is known, and then is seen nearer than it is.
-TEST_F(NoisyImages, AKnownSurfaceSeenWithinItsErrorIsNoNewOne) {
-  constexpr DepthError kExact{.constant_m = 0.001, .quadratic_per_m = 0.0, .mixes = true};
-  constexpr DepthError kFar{.constant_m = 0.02, .quadratic_per_m = 0.0015, .mixes = true};
-  const auto nearer_by = [this](float off_m) {
-    return [this, off_m](std::vector<float>& image) {
-      for (float& depth_m : image)
-        depth_m -= 0.0001F * static_cast<float>(scans_);  // no two images are the same
-      if (&image == scene_.image.data())
-        for (float& depth_m : image) depth_m -= off_m;
-    };
-  };
-  const auto before_the_wall = [&](double off_m, const DepthError& error) {
-    begin();
-    for (int scan = 0; scan < 4; ++scan) see(nearer_by(0.0F), kExact);
-    EXPECT_EQ(at(Vector3(7.95, 0.2, 5.0)), CellState::kOccupied);
-    EXPECT_EQ(at(Vector3(7.95 - off_m, 0.2, 5.0)), CellState::kFree);
-    see(nearer_by(static_cast<float>(off_m)), error);
-    return at(Vector3(7.95 - off_m, 0.2, 5.0));
-  };
-  EXPECT_EQ(before_the_wall(0.3, kFar), CellState::kFree) << "0.35 m are three sigma at 8 m";
-  EXPECT_EQ(before_the_wall(0.3, kExact), CellState::kOccupied) << "who sees exactly saw something new";
-  EXPECT_EQ(before_the_wall(1.2, kFar), CellState::kOccupied) << "so much is no noise";
-}
-
 TEST_F(NoisyImages, APoleIsKeptByACameraThatMixes) {
   const test::Scene missed = scene_;
   scene_.solid.push_back({Vector3(5.1, 1.972, 0), Vector3(5.15, 2.022, 12)});
