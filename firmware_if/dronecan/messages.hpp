@@ -294,6 +294,7 @@ using Dictionary = std::tuple<
     Entry<BatteryInfo, 1092, 0x249c26548a711966ULL>, Entry<RangeMeasurement, 1050, 0x68fffe70fc771952ULL>,
     Entry<StaticPressure, 1028, 0xcdc7c43412bdc89aULL>, Entry<GlobalTimeSync, 4, 0x20271116a793c2dbULL>,
     Entry<StaticTemperature, 1029, 0x49272a6477d96271ULL>,
+    Entry<MagneticFieldStrength, 1001, 0xe2a7d4a9460bc2f2ULL>,
     Entry<MagneticFieldStrength2, 1002, 0xb6ac0c442430297eULL>,
     Entry<GnssHeading, 20002, 0x315cae39eced3412ULL>, Entry<LightsCommand, 1081, 0x2031d93c8bdd1ec4ULL>,
     Entry<Allocation, 1, 0x0b2a812620a11d40ULL>, Entry<GetNodeInfoRequest, 1, 0xee468a8121c46a9eULL>,

@@ -173,7 +173,19 @@ struct StaticTemperature {
   };
 };
 
-/// Body frame FRD.
+/// From the magnetometer of a node that has one. Body frame FRD.
+struct MagneticFieldStrength {
+  static constexpr std::string_view kName{"uavcan.equipment.ahrs.MagneticFieldStrength"};
+  Fixed<Float<16>, 3>::Value magnetic_field_ga{};  ///< Gauss
+  Dynamic<Float<16>, 9>::Value magnetic_field_covariance{};
+  static constexpr std::tuple kFields{
+      Field<Fixed<Float<16>, 3>, &MagneticFieldStrength::magnetic_field_ga>{"magnetic_field_ga"},
+      Field<Dynamic<Float<16>, 9>, &MagneticFieldStrength::magnetic_field_covariance>{
+          "magnetic_field_covariance"},
+  };
+};
+
+/// From one of the magnetometers of a node. Body frame FRD.
 struct MagneticFieldStrength2 {
   static constexpr std::string_view kName{"uavcan.equipment.ahrs.MagneticFieldStrength2"};
   Uint<8>::Value sensor_id{};

@@ -107,6 +107,7 @@ void print(const live::PlantReport& r, bool json) {
                         {"releases", r.autopilot->releases},
                         {"lost_frames", r.autopilot->lost_frames},
                         {"doubled_frames", r.autopilot->doubled_frames}};
+    if (r.package) j["package"] = {{"height_m", r.package->height_m}, {"speed_mps", r.package->speed_mps}};
     if (r.physics)
       j["physics"] = {{"steps", r.physics->steps},
                       {"lost", r.physics->lost},
@@ -124,6 +125,9 @@ void print(const live::PlantReport& r, bool json) {
              : r.physics ? "steps"
                          : "bus frames",
              r.faults);
+  if (r.package)
+    fmt::print("the package left its hook {:.2f} m above the ground, at {:.2f} m/s\n", r.package->height_m,
+               r.package->speed_mps);
   if (r.physics)
     fmt::print("autopilot: {} packets lost, {} resent, {} refused, {} restarts\n", r.physics->lost,
                r.physics->resent, r.physics->refused, r.physics->restarts);
@@ -242,10 +246,11 @@ void add_plant_command(CLI::App& app, std::function<int()>& run) {
   add_number(*command, "--seconds", options->seconds, 0.1, 86400.0,
              "End after this time at the latest; default: as long as it takes")
       ->default_str("");
-  command->add_flag(
-      "--bus-sensors", options->bus_sensors,
-      "IMU, receiver and barometer are nodes on the vehicle's CAN bus (RawIMU, Fix2, ...): for roborun run "
-      "--link dronecan:port:NAME");
+  command->add_flag("--bus-sensors", options->bus_sensors,
+                    "IMU, receiver, magnetometer, barometer and range finder are nodes on the vehicle's CAN "
+                    "bus (RawIMU, Fix2, "
+                    "...): for roborun run "
+                    "--link dronecan:port:NAME");
   command->add_option(
       "--can", options->can,
       "That bus is this interface of the kernel: for roborun run --link dronecan:INTERFACE on the other end");

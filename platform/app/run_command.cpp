@@ -128,13 +128,9 @@ void take_mission(const RunOptions& options, live::LiveConfig& config) {
   }
 }
 
-/// Its goals have room, and somebody releases what it releases.
+/// Its goals have room.
 void check(const RunOptions& options, const live::LiveConfig& config) {
   try {
-    for (const live::RouteStep& step : config.route->steps)
-      if (step.releases && !config.autopilot)
-        throw InputError(
-            fmt::format("{}: gripper: goes with an autopilot, sensor ports have no hook", step.where));
     live::check_route(*config.route, config.flight.bounds_W, config.flight.fence,
                       planned_radius_m(config.flight.vehicle));
   } catch (const InputError& error) {

@@ -53,6 +53,9 @@ class ActuatorSide final : public firmware_if::Motors {
   [[nodiscard]] const firmware_if::KillSwitch& kill_switch() const noexcept { return kill_switch_; }
   [[nodiscard]] const firmware_if::dronecan::Node& node() const noexcept { return node_; }
   [[nodiscard]] const firmware_if::TransmitGate& gate() const noexcept { return gate_; }
+  /// For what else the flight lane says on the bus.
+  [[nodiscard]] firmware_if::TransmitGate& gate() noexcept { return gate_; }
+  [[nodiscard]] bool armed() const noexcept { return armed_; }
 
  private:
   firmware_if::TransmitGate gate_;

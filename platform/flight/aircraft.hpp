@@ -1,6 +1,7 @@
 /// What the flight lane reads and commands, whoever is behind it: a simulation, or the recording of one.
 #pragma once
 
+#include "core/geometry/vector.hpp"
 #include "firmware_if/autopilot.hpp"
 #include "firmware_if/barometer.hpp"
 #include "firmware_if/gnss.hpp"
@@ -19,10 +20,19 @@ struct AircraftHealth {
   bool killed{};           ///< By the kill switch, for good.
 };
 
+/// What the flight lane knows of it at the end of a minor frame.
+struct Flown {
+  bool estimated{};                 ///< The next three are.
+  Vector3 up_B = Vector3::UnitZ();  ///< The vertical in the body's axes: forward, left, up.
+  double height_m{};                ///< Over the place of the take-off.
+  double speed_mps{};
+  bool acts{};  ///< The failsafe does something.
+};
+
 /// Contract:
 ///  1. No call blocks or allocates.
 ///  2. Each minor frame of the flight lane calls begin_frame(), then reads the sensors, then asks for
-///  health() at most once, then commands the motors at most once, then calls end_frame().
+///  health() at most once, then commands the motors at most once, then calls end_frame(), then is_flown().
 class Aircraft {
  public:
   virtual ~Aircraft() = default;
@@ -45,6 +55,7 @@ class Aircraft {
   virtual void disarm() noexcept = 0;
   /// What was commanded leaves.
   virtual void end_frame(MonotonicTime now) noexcept = 0;
+  virtual void is_flown(const Flown& flown) noexcept { (void)flown; }
 };
 
 }  // namespace roborun::flight

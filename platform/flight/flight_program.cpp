@@ -79,6 +79,9 @@ void FlightProgram::publish(MonotonicTime now) noexcept {
   report.standing = control_.standing(now);
   report.home_W = control_.home_W();
   report.ground_m = control_.ground_m();
+  aircraft_.is_flown({report.estimated, report.state.q_WB.inverse() * Vector3::UnitZ(),
+                      report.state.p_WB.z() - report.ground_m, report.state.v_WB.norm(),
+                      report.action != Action::kGoOn});
   mail_.report.publish();
 }
 

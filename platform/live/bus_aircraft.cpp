@@ -20,7 +20,8 @@ std::unique_ptr<gpio::GpiodInput> open_line(const std::optional<gpio::LineConfig
 
 BusAircraft::BusAircraft(std::unique_ptr<BusWire> wire, const sensor_port::VehiclePorts& ports,
                          const SensorRig& rig, Nanos minor_frame, Nanos epoch,
-                         const std::optional<sensor_port::EarthPlace>& origin, const BusLines& lines)
+                         const std::optional<sensor_port::EarthPlace>& origin, const BusLines& lines,
+                         bool needs_hook)
     : clock_{epoch},
       origin_(origin),
       wire_(std::move(wire)),
@@ -33,7 +34,8 @@ BusAircraft::BusAircraft(std::unique_ptr<BusWire> wire, const sensor_port::Vehic
           kill_lines_ ? static_cast<firmware_if::GpioInput&>(kill_lines_->open()) : lines_.device.kill_open(),
           kill_lines_ ? static_cast<firmware_if::GpioInput&>(kill_lines_->closed())
                       : lines_.device.kill_closed(),
-          flight::Arming::kProven) {
+          flight::Arming::kProven),
+      hook_and_light_(actuators_, needs_hook) {
   if (rig.odometry != OdometryModel::kNone)
     prepare(odometry_.emplace(), "odometry", ports.odometry(), std::chrono::milliseconds(500));
   prepare(lines_, "lines", ports.lines(), sensor_port::PortLines::kGoneAfter);
@@ -108,11 +110,12 @@ std::vector<Need> BusAircraft::look(MonotonicTime now) {
   // Lines that nobody writes yet are no pressed switch.
   if (!has_lines) return needs;
   // The node says that it is there, and hears who else is. Nothing is armed.
-  actuators_.step(now);
+  end_frame(now);
   needs.push_back(
       {"operator", lines_.device.hears_operator() ? "" : "is not heard: switch the transmitter on"});
   needs.push_back(look_at_kill_switch());
   look_at_power(actuators_, now, needs);
+  hook_and_light_.look(now, needs);
   const bool others =
       std::all_of(needs.begin(), needs.end(), [](const Need& need) { return need.lacks.empty(); });
   needs.push_back(look_at_arming(others));

@@ -12,6 +12,7 @@
 #include "platform/live/bus_sensors.hpp"
 #include "platform/live/bus_wire.hpp"
 #include "platform/live/far_end.hpp"
+#include "platform/live/hook_and_light.hpp"
 #include "platform/live/port_look.hpp"
 #include "platform/live/port_pictures.hpp"
 #include "platform/sensor_port/port_bus.hpp"
@@ -23,11 +24,11 @@ namespace roborun::live {
 /// if the kill switch was seen to work, on both wires, and the arming switch was switched on after all else was ready.
 class BusAircraft final : public FarEnd {
  public:
-  /// What of `rig` has to be there. Stamps count from `epoch`; the world begins at `origin`, or at the first fix. Throws
-  /// InputError for lines that cannot be had, and a kill switch that does not stand on run.
+  /// What of `rig` has to be there, and with `needs_hook` a package. Stamps count from `epoch`; the world begins at `origin`, or
+  /// at the first fix. Throws InputError for lines that cannot be had, and a kill switch that does not stand on run.
   BusAircraft(std::unique_ptr<BusWire> wire, const sensor_port::VehiclePorts& ports, const SensorRig& rig,
               Nanos minor_frame, Nanos epoch, const std::optional<sensor_port::EarthPlace>& origin,
-              const BusLines& lines);
+              const BusLines& lines, bool needs_hook);
   BusAircraft(const BusAircraft&) = delete;
   BusAircraft& operator=(const BusAircraft&) = delete;
 
@@ -59,7 +60,18 @@ class BusAircraft final : public FarEnd {
   }
   void terminate() noexcept override { actuators_.terminate(); }
   void disarm() noexcept override { actuators_.disarm(); }
-  void end_frame(MonotonicTime now) noexcept override { actuators_.step(now); }
+  void end_frame(MonotonicTime now) noexcept override {
+    actuators_.step(now);
+    hook_and_light_.step(now, flown_, sensors_.height_m(now).value_or(flown_.height_m));
+  }
+  void is_flown(const flight::Flown& flown) noexcept override {
+    flown_ = flown;
+    if (flown.estimated) sensors_.set_up(flown.up_B);
+  }
+  void release_package() noexcept override { hook_and_light_.release(); }
+  [[nodiscard]] std::uint64_t packages_released() const noexcept override {
+    return hook_and_light_.released();
+  }
 
  private:
   [[nodiscard]] Need look_at_bus(MonotonicTime now);
@@ -77,6 +89,8 @@ class BusAircraft final : public FarEnd {
   std::unique_ptr<gpio::GpiodInput> arm_line_;         ///< Null: the port's.
   BusSensors sensors_;
   flight::ActuatorSide actuators_;
+  HookAndLight hook_and_light_;
+  flight::Flown flown_{};
   std::uint64_t frames_{0};  ///< Heard on the bus until heard_.
   MonotonicTime heard_ = MonotonicTime::min();
   bool was_safe_{false};  ///< The arming switch, once all else was there.

@@ -7,14 +7,21 @@
 #include <limits>
 
 #include "core/geometry/math.hpp"
+#include "platform/live/earth_field.hpp"
 
 namespace roborun::live {
 namespace {
 
 namespace dc = firmware_if::dronecan;
 
-constexpr std::array kTypes{dc::kType<dc::RawImu>, dc::kType<dc::GnssFix2>, dc::kType<dc::GnssHeading>,
-                            dc::kType<dc::StaticPressure>, dc::kType<dc::GlobalTimeSync>};
+constexpr std::array kTypes{dc::kType<dc::RawImu>,
+                            dc::kType<dc::GnssFix2>,
+                            dc::kType<dc::GnssHeading>,
+                            dc::kType<dc::StaticPressure>,
+                            dc::kType<dc::GlobalTimeSync>,
+                            dc::kType<dc::MagneticFieldStrength>,
+                            dc::kType<dc::MagneticFieldStrength2>,
+                            dc::kType<dc::RangeMeasurement>};
 constexpr int kMostFrames = 128;           // 17 ms of a full bus
 constexpr Nanos kLongestAge{500'000'000};  // of a measurement, from its own stamp
 constexpr Nanos kSameEpoch{50'000'000};    // between a fix and its heading
@@ -24,6 +31,8 @@ constexpr std::uint8_t kFix3d = 3;
 constexpr double kLeastRate_Hz = 100.0;
 constexpr double kGravityError_mps2 = 1.0;
 constexpr double kUprightCos = 0.85;
+constexpr double kStanding_m = 1.0;
+constexpr Nanos kAntennas{1'000'000'000};  // silent for so long, two antennas say no heading
 
 /// From forward, right, down to forward, left, up.
 std::array<double, 3> to_flu(const auto& frd, double scale) noexcept {
@@ -61,7 +70,12 @@ BusSensors::BusSensors(firmware_if::CanBus& bus, const SensorRig& rig,
       has_gnss_(rig.gnss != GnssModel::kNone),
       needs_heading_(rig.odometry == OdometryModel::kNone),
       reassembler_(kTypes, sessions_, 0) {
-  if (origin) frame_.emplace(*origin);
+  if (origin) begin_at(*origin);
+}
+
+void BusSensors::begin_at(const sensor_port::EarthPlace& origin) noexcept {
+  frame_.emplace(origin);
+  compass_.stand_in(earth_field_gauss(origin.latitude_deg, origin.longitude_deg));
 }
 
 void BusSensors::hear(MonotonicTime now) noexcept {
@@ -84,6 +98,12 @@ void BusSensors::take(const dc::Transfer& transfer) noexcept {
       return hear_as<dc::GnssHeading>(transfer, heading_voice_);
     case dc::kType<dc::StaticPressure>.id:
       return hear_as<dc::StaticPressure>(transfer, pressure_voice_);
+    case dc::kType<dc::MagneticFieldStrength>.id:
+      return hear_as<dc::MagneticFieldStrength>(transfer, field_voice_);
+    case dc::kType<dc::MagneticFieldStrength2>.id:
+      return hear_as<dc::MagneticFieldStrength2>(transfer, field_voice_);
+    case dc::kType<dc::RangeMeasurement>.id:
+      return hear_as<dc::RangeMeasurement>(transfer, range_voice_);
     default: {
       dc::GlobalTimeSync sync;
       if (dc::decode(transfer.payload, sync) == Status::kOk)
@@ -176,7 +196,7 @@ void BusSensors::take(const dc::GnssFix2& m, MonotonicTime came) noexcept {
                                                        : nullptr;
   fix.stamp = measured_at(m.timestamp.usec, came, came - kFixAge);
   if (!accept(fix_voice_, why, fix.stamp)) return;
-  if (!frame_) frame_.emplace(place);
+  if (!frame_) begin_at(place);
   fix.sequence = static_cast<std::uint32_t>(fix_voice_.taken);
   fix.p_WB_m = frame_->to_local_m(place);
   fix.sigma_horizontal_m = std::sqrt(std::max(variance[0], variance[1]));
@@ -204,6 +224,20 @@ void BusSensors::take(const dc::GnssHeading& m, MonotonicTime came) noexcept {
 }
 
 void BusSensors::let_go() noexcept {
+  const bool has_two_antennas = heading_voice_.node != 0 && waits_since_ - heading_voice_.stamp < kAntennas;
+  if (!std::isfinite(waiting_->heading_rad) && !has_two_antennas) {
+    const auto apart = [&](const Bearing& b) {
+      return std::max(b.stamp - waiting_->stamp, waiting_->stamp - b.stamp);
+    };
+    const auto nearest =
+        std::min_element(bearings_.begin(), bearings_.end(), [&](const Bearing& a, const Bearing& b) {
+          return a.stamp != MonotonicTime::min() && (b.stamp == MonotonicTime::min() || apart(a) < apart(b));
+        });
+    if (nearest->stamp != MonotonicTime::min() && apart(*nearest) <= kSameEpoch) {
+      waiting_->heading_rad = nearest->heading.rad;
+      waiting_->sigma_heading_rad = nearest->heading.sigma_rad;
+    }
+  }
   (void)gnss_.ring.push(*waiting_);
   waiting_.reset();
 }
@@ -219,6 +253,63 @@ void BusSensors::take(const dc::StaticPressure& m, MonotonicTime came) noexcept 
   sample.sequence = static_cast<std::uint32_t>(pressure_voice_.taken);
   sample.altitude_m = altitude_m - *first_altitude_m_ + start_m_;
   (void)pressure_.ring.push(sample);
+}
+
+void BusSensors::take_field(const std::array<float, 3>& field_frd, MonotonicTime came) noexcept {
+  field_voice_.heard = came;
+  if (!frame_ || !up_B_) return;  // nobody knows yet what it should be
+  Compass::Heading heading;
+  const char* why = compass_.read(Vector3(to_flu(field_frd, 1.0).data()), *up_B_, heading);
+  if (!accept(field_voice_, why, came)) return;
+  bearings_[next_bearing_] = {came, heading};
+  next_bearing_ = (next_bearing_ + 1) % bearings_.size();
+}
+
+void BusSensors::take(const dc::MagneticFieldStrength& m, MonotonicTime came) noexcept {
+  take_field(m.magnetic_field_ga, came);
+}
+
+void BusSensors::take(const dc::MagneticFieldStrength2& m, MonotonicTime came) noexcept {
+  if (!magnetometer_) magnetometer_ = m.sensor_id;
+  if (m.sensor_id == *magnetometer_) take_field(m.magnetic_field_ga, came);
+}
+
+void BusSensors::take(const dc::RangeMeasurement& m, MonotonicTime came) noexcept {
+  constexpr std::uint8_t kUndefined = 0, kValid = 1, kTooClose = 2, kTooFar = 3;
+  constexpr int kDown = -8, kNearlyDown = -7;  // of pitch, in twelfths of pi
+  const auto& beam = m.beam_orientation_in_body_frame;
+  const auto pitch = beam.fixed_axis_roll_pitch_yaw[1];
+  range_voice_.heard = came;
+  const bool looks_down = !beam.orientation_defined || pitch == kDown || pitch == kNearlyDown;
+  const auto range_m = static_cast<double>(m.range);
+  const bool measured = m.reading_type == kUndefined || m.reading_type == kValid;
+  const char* why = !looks_down                                               ? "is not of what is below"
+                    : measured && !(std::isfinite(range_m) && range_m >= 0.0) ? "is no distance"
+                    : m.reading_type > kTooFar                                ? "is of no known kind"
+                                                                              : nullptr;
+  if (!accept(range_voice_, why, came)) return;
+  range_m_ = measured ? range_m : m.reading_type == kTooClose ? 0.0 : std::numeric_limits<double>::infinity();
+}
+
+std::optional<double> BusSensors::height_m(MonotonicTime now) const noexcept {
+  constexpr double kLeastCos = 0.9;  // 25 degrees: beside the vehicle from there on
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  if (range_voice_.node == 0) return std::nullopt;
+  const bool is_fresh = range_voice_.refusal == nullptr && range_voice_.taken > 0 &&
+                        now - range_voice_.stamp <= range_voice_.patience;
+  if (!is_fresh || !up_B_ || !(up_B_->z() >= kLeastCos)) return kUnknown;
+  return range_m_ * up_B_->z();
+}
+
+Need BusSensors::need_of_heading(MonotonicTime now) {
+  Need antennas = need_of(heading_voice_, now);
+  if (antennas.lacks.empty() || field_voice_.node == 0) return antennas;
+  // Until then it cannot be told what it should measure.
+  if (field_voice_.taken + field_voice_.refused == 0)
+    return {antennas.device, "its magnetometer waits for a fix, and for an IMU at rest"};
+  Need field = need_of(field_voice_, now);
+  field.device = antennas.device;
+  return field;
 }
 
 Need BusSensors::need_of(Voice& voice, MonotonicTime now) {
@@ -252,6 +343,7 @@ void BusSensors::rest(MonotonicTime now) noexcept {
   if (rest_.is_known) {
     rest_.rate_Hz = static_cast<double>(rest_.count) / passed_s;
     rest_.mean_B_mps2 = rest_.sum_B_mps2 / static_cast<double>(rest_.count);
+    up_B_ = rest_.mean_B_mps2.normalized();
   }
   rest_.begin = now;
   rest_.count = 0;
@@ -280,7 +372,7 @@ void BusSensors::look(MonotonicTime now, std::vector<Need>& needs) {
     if (!needs.back().lacks.empty() && fix_voice_.node != 0)
       needs.back().lacks += fmt::format(" ({} satellites)", satellites_);
     // Odometry begins with a heading of its own.
-    if (needs_heading_) needs.push_back(need_of(heading_voice_, now));
+    if (needs_heading_) needs.push_back(need_of_heading(now));
     firmware_if::GnssFix fix;
     while (gnss_.read(fix) == Status::kOk) start_m_ = fix.p_WB_m[2];
   }
@@ -288,6 +380,11 @@ void BusSensors::look(MonotonicTime now, std::vector<Need>& needs) {
   firmware_if::BarometerSample sample;
   while (pressure_.read(sample) == Status::kOk) {
   }
+  if (range_voice_.node == 0) return;  // it need not have one
+  needs.push_back(need_of(range_voice_, now));
+  if (needs.back().lacks.empty() && range_m_ > kStanding_m)
+    needs.back().lacks = fmt::format("node {}: measures {:.1f} m on the ground: it must look down",
+                                     range_voice_.node, range_m_);
 }
 
 void BusSensors::use(MonotonicTime now, std::vector<PortUse>& all) const {
@@ -300,8 +397,10 @@ void BusSensors::use(MonotonicTime now, std::vector<PortUse>& all) const {
   if (has_gnss_) {
     add(fix_voice_, gnss_.ring.dropped());
     add(heading_voice_, 0);
+    if (field_voice_.node != 0) add(field_voice_, 0);
   }
   add(pressure_voice_, pressure_.ring.dropped());
+  if (range_voice_.node != 0) add(range_voice_, 0);
 }
 
 }  // namespace roborun::live

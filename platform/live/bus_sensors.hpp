@@ -1,5 +1,5 @@
-/// The navigation sensors of a vehicle on its DroneCAN bus, as devices of the runtime: RawIMU, Fix2 with Heading,
-/// StaticPressure.
+/// The navigation sensors of a vehicle on its DroneCAN bus, as devices of the runtime: RawIMU, Fix2 with the heading of two
+/// antennas or of a magnetometer, StaticPressure, and a range finder that looks down.
 #pragma once
 
 #include <array>
@@ -15,6 +15,7 @@
 #include "firmware_if/dronecan/bus_time.hpp"
 #include "firmware_if/gnss.hpp"
 #include "firmware_if/imu.hpp"
+#include "platform/live/compass.hpp"
 #include "platform/live/far_end.hpp"
 #include "platform/sensor_port/port_navigation.hpp"
 
@@ -26,6 +27,9 @@ namespace roborun::live {
 ///
 /// Stamps: the message's own, where it has one and a master keeps the bus's time; else when it came, a fix kFixAge before that.
 /// IMU: the means over the integration interval, which carry all bits; where a node does not integrate, the latest values.
+///
+/// Heading of a fix: of two antennas; where those have been silent for a second, of the magnetometer at the time of the fix, with
+/// the vertical as is_flown() says it (before the flight: as the IMU does).
 class BusSensors {
  public:
   /// Assumed of receivers without a shared clock: from the measurement to the bus.
@@ -42,6 +46,10 @@ class BusSensors {
   [[nodiscard]] firmware_if::Imu& imu() noexcept { return imu_; }
   [[nodiscard]] firmware_if::Gnss& gnss() noexcept { return gnss_; }
   [[nodiscard]] firmware_if::Barometer& barometer() noexcept { return pressure_; }
+  /// The flight lane, at the end of a minor frame: the vertical in the body's axes, a unit vector.
+  void set_up(const Vector3& up_B) noexcept { up_B_ = up_B; }
+  /// Above what is straight below; NaN: unknown. None: there is no range finder.
+  [[nodiscard]] std::optional<double> height_m(MonotonicTime now) const noexcept;
 
   /// As FarEnd::look(), after hear(): takes what the devices hold.
   void look(MonotonicTime now, std::vector<Need>& needs);
@@ -67,6 +75,11 @@ class BusSensors {
     }
     core::SpscRing<Sample, 32> ring;
   };
+  /// What the compass said.
+  struct Bearing {
+    MonotonicTime stamp = MonotonicTime::min();
+    Compass::Heading heading{};
+  };
   /// Mean of what the IMU measured, and how often, over the last whole second on the ground.
   struct Rest {
     MonotonicTime begin{};
@@ -77,11 +90,17 @@ class BusSensors {
     bool is_known{false};
   };
 
+  void begin_at(const sensor_port::EarthPlace& origin) noexcept;
   void take(const firmware_if::dronecan::Transfer& transfer) noexcept;
   void take(const firmware_if::dronecan::RawImu& m, MonotonicTime came) noexcept;
   void take(const firmware_if::dronecan::GnssFix2& m, MonotonicTime came) noexcept;
   void take(const firmware_if::dronecan::GnssHeading& m, MonotonicTime came) noexcept;
   void take(const firmware_if::dronecan::StaticPressure& m, MonotonicTime came) noexcept;
+  void take(const firmware_if::dronecan::MagneticFieldStrength& m, MonotonicTime came) noexcept;
+  void take(const firmware_if::dronecan::MagneticFieldStrength2& m, MonotonicTime came) noexcept;
+  void take(const firmware_if::dronecan::RangeMeasurement& m, MonotonicTime came) noexcept;
+  /// Gauss, forward, right, down.
+  void take_field(const std::array<float, 3>& field_frd, MonotonicTime came) noexcept;
   /// It is of the node that is believed, and decodes.
   template <typename T>
   void hear_as(const firmware_if::dronecan::Transfer& transfer, Voice& voice) noexcept;
@@ -93,6 +112,7 @@ class BusSensors {
   void let_go() noexcept;
   void rest(MonotonicTime now) noexcept;
   [[nodiscard]] static Need need_of(Voice& voice, MonotonicTime now);
+  [[nodiscard]] Need need_of_heading(MonotonicTime now);
 
   firmware_if::CanBus& bus_;
   bool has_gnss_, needs_heading_;
@@ -102,8 +122,12 @@ class BusSensors {
   std::optional<sensor_port::LocalFrame> frame_;
   Voice imu_voice_{"imu", "RawIMU", Nanos{25'000'000}};
   Voice fix_voice_{"gnss", "Fix2", Nanos{1'000'000'000}};
-  Voice heading_voice_{"heading", "ardupilot.gnss.Heading, of a receiver with two antennas,",
-                       Nanos{1'000'000'000}};
+  Voice heading_voice_{
+      "heading",
+      "ardupilot.gnss.Heading (a receiver with two antennas), nor MagneticFieldStrength (a magnetometer),",
+      Nanos{1'000'000'000}};
+  Voice field_voice_{"magnetometer", "MagneticFieldStrength", Nanos{500'000'000}};
+  Voice range_voice_{"range", "range_sensor.Measurement", Nanos{500'000'000}};
   Voice pressure_voice_{"pressure", "StaticPressure", Nanos{500'000'000}};
   Device<firmware_if::Imu, firmware_if::ImuSample> imu_;
   Device<firmware_if::Gnss, firmware_if::GnssFix> gnss_;
@@ -111,6 +135,12 @@ class BusSensors {
   std::optional<firmware_if::GnssFix> waiting_;  ///< For its heading.
   MonotonicTime waits_since_{};
   std::uint8_t satellites_{0};
+  Compass compass_;
+  std::optional<std::uint8_t> magnetometer_;  ///< The first one of a node that has several.
+  std::array<Bearing, 64> bearings_{};        ///< A ring.
+  std::size_t next_bearing_{0};
+  std::optional<Vector3> up_B_;
+  double range_m_{0.0};  ///< Along the beam, of range_voice_.stamp.
   std::optional<double> first_altitude_m_;
   double start_m_{0.0};  ///< Height of where it stands.
   Rest rest_;

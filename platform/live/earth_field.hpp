@@ -1,4 +1,4 @@
-/// The earth's magnetic field: for a compass that is simulated.
+/// The earth's magnetic field: what a compass should measure, and a simulated one does.
 #pragma once
 
 #include "core/geometry/vector.hpp"

@@ -55,6 +55,7 @@ board::ImageLimits images_of(const LiveConfig& config) {
 }
 
 std::unique_ptr<FarEnd> far_end_of(const LiveConfig& config, const rt::MonotonicClock& clock) {
+  const bool releases = config.route && config.route->releases();
   if (config.autopilot)
     return std::make_unique<MavlinkAircraft>(
         *config.link.mavlink, *config.autopilot, sensor_port::VehiclePorts(config.link.name), config.rig,
@@ -64,10 +65,10 @@ std::unique_ptr<FarEnd> far_end_of(const LiveConfig& config, const rt::Monotonic
     auto wire = config.link.dronecan->empty() ? port_wire(ports, clock.epoch())
                                               : kernel_wire(*config.link.dronecan, clock.epoch());
     return std::make_unique<BusAircraft>(std::move(wire), ports, config.rig, config.flight.minor_frame,
-                                         clock.epoch(), config.origin, config.lines);
+                                         clock.epoch(), config.origin, config.lines, releases);
   }
   return std::make_unique<PortAircraft>(config.link.name, config.rig, config.flight.minor_frame,
-                                        clock.epoch(), config.origin);
+                                        clock.epoch(), config.origin, releases);
 }
 
 LiveAutopilot report_of(const MavlinkAircraft& vehicle) {
@@ -233,7 +234,8 @@ void LiveRun::listen_to_ground() {
 
 void LiveRun::follow_route(double now_s) {
   if (!follows_route_ || seen_.phase.load(std::memory_order_relaxed) != governor::Phase::kMission) return;
-  const RouteFlight::Order order = route_->step(now_s, end_.p_W(), end_.is_there());
+  const RouteFlight::Order order =
+      route_->step(now_s, end_.p_W(), end_.is_there(), far_->packages_released());
   if (order.speed_mps) cap_mps_.store(*order.speed_mps, std::memory_order_relaxed);
   if (order.releases) far_->release_package();
   if (order.goal_W) {

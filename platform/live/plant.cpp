@@ -279,6 +279,7 @@ PlantReport Plant::run(const std::function<void(const PlantProgress&)>& progress
   if (side_) {
     report_.commands = side_->commands();
     report_.autopilot = side_->autopilot();
+    report_.package = side_->package();
   }
   if (physics_) report_.physics = physics_->counters();
   return std::move(report_);

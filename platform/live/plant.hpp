@@ -45,6 +45,7 @@ struct PlantReport {
   std::uint64_t commands{};  ///< Frames heard on the bus, set-points, or steps of a real autopilot.
   double speed_mps{};        ///< At the end.
   std::optional<PlantAutopilotReport> autopilot{};
+  std::optional<PlantPackage> package{};  ///< None: it hangs on the hook, or there is none.
   std::optional<PhysicsCounters> physics{};
   /// "collision", "landed" (on the ground again, motors off), "time_limit" or "interrupted".
   std::string reason;

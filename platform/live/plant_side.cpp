@@ -11,9 +11,13 @@
 #include "platform/live/plant_ports.hpp"
 #include "platform/sensor_port/port_bus.hpp"
 #include "platform/sitl/autopilot/fake_autopilot.hpp"
+#include "platform/sitl/bus/fake_hardpoint.hpp"
+#include "platform/sitl/bus/fake_light.hpp"
 
 namespace roborun::live {
 namespace {
+
+constexpr std::uint8_t kHookNode = 34, kLightNode = 35;
 
 /// Sensors, bus and lines as another process sees them.
 class PortSide final : public PlantSide {
@@ -24,8 +28,10 @@ class PortSide final : public PlantSide {
       : plant_(plant),
         bus_out_(names.bus_out()),
         navigation_(rig, names, origin, on_bus.has_value()),
-        kernel_(std::move(kernel)) {
-    if (on_bus) nodes_.emplace(plant.far_side().spare_bus(), origin);
+        kernel_(std::move(kernel)),
+        hook_({.node_id = kHookNode}, plant.far_side().spare_bus(1)),
+        light_(kLightNode, 0, plant.far_side().spare_bus(2)) {
+    if (on_bus) nodes_.emplace(plant.far_side().spare_bus(), origin, rig.gnss);
     if (kernel_) return;
     const std::string wrong = bus_.speak(names.bus_in(), {});
     if (!wrong.empty()) throw InputError(fmt::format("{}: {}", names.bus_in(), wrong));
@@ -55,7 +61,12 @@ class PortSide final : public PlantSide {
   void tell(MonotonicTime clock_now, Nanos shift) override {
     shift_ = shift;
     sitl::FaultySensors& sensors = plant_.sensors();
-    if (nodes_) nodes_->step(plant_.now(), clock_now - plant_.now());
+    if (nodes_) nodes_->step(plant_.now(), clock_now - plant_.now(), plant_.vehicle());
+    hook_.step(plant_.now());
+    light_.step(plant_.now());
+    if (!package_ && !hook_.holds_package())
+      package_ = {plant_.vehicle().state().p_WB.z() - plant_.vehicle().ground_m(),
+                  plant_.vehicle().state().v_WB.norm()};
     const auto pass = [&](auto sample) {
       while (sensors.read(sample) == Status::kOk) {
         if constexpr (requires { nodes_->say(sample); }) {
@@ -96,6 +107,7 @@ class PortSide final : public PlantSide {
   }
 
   [[nodiscard]] std::uint64_t commands() const override { return commands_; }
+  [[nodiscard]] std::optional<PlantPackage> package() const override { return package_; }
   [[nodiscard]] std::uint64_t lost() const override {
     if (kernel_) return kernel_->counters().lost_on_receive + kernel_->counters().refused;
     return bus_.reader().counters().dropped;
@@ -114,6 +126,9 @@ class PortSide final : public PlantSide {
   std::unique_ptr<can::SocketCan> kernel_;  ///< Instead of bus_; may be null.
   std::optional<SensorNodes> nodes_;        ///< None: the sensors are ports.
   PlantOperator operator_;
+  sitl::FakeHardpoint hook_;
+  sitl::FakeLight light_;
+  std::optional<PlantPackage> package_;
   Nanos shift_{0};
   bool listens_{false};
   std::uint64_t commands_{0};

@@ -33,6 +33,12 @@ struct PlantAutopilotReport {
   std::uint64_t lost_frames{}, doubled_frames{};  ///< Of the runtime, by their sequence numbers.
 };
 
+/// The package as it left the hook.
+struct PlantPackage {
+  double height_m{};  ///< Above the ground.
+  double speed_mps{};
+};
+
 /// One thread. Nothing blocks.
 class PlantSide {
  public:
@@ -48,6 +54,7 @@ class PlantSide {
   [[nodiscard]] virtual std::uint64_t commands() const = 0;
   [[nodiscard]] virtual std::uint64_t lost() const = 0;  ///< Of what was sent to it.
   [[nodiscard]] virtual std::optional<PlantAutopilotReport> autopilot() const { return std::nullopt; }
+  [[nodiscard]] virtual std::optional<PlantPackage> package() const { return std::nullopt; }
 };
 
 /// IMU, receiver and barometer are nodes on the bus, and an operator proves the kill switch and arms.

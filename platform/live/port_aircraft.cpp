@@ -7,13 +7,14 @@
 
 namespace roborun::live {
 PortAircraft::PortAircraft(const std::string& name, const SensorRig& rig, Nanos minor_frame, Nanos epoch,
-                           const std::optional<sensor_port::EarthPlace>& origin)
+                           const std::optional<sensor_port::EarthPlace>& origin, bool needs_hook)
     : clock_{epoch},
       origin_(origin),
       bus_out_(sensor_port::VehiclePorts(name).bus_out()),
       pictures_(sensor_port::VehiclePorts(name), rig, clock_),
       lines_(lines_port_.device),
-      actuators_(minor_frame, bus_.device, lines_port_.device.kill_open(), lines_port_.device.kill_closed()) {
+      actuators_(minor_frame, bus_.device, lines_port_.device.kill_open(), lines_port_.device.kill_closed()),
+      hook_and_light_(actuators_, needs_hook) {
   using std::chrono::milliseconds;
   const sensor_port::VehiclePorts ports(name);
   prepare(imu_, "imu", ports.imu(), milliseconds(25));
@@ -57,7 +58,7 @@ void PortAircraft::look_at_bus(MonotonicTime now, std::vector<Need>& needs) {
       lines_port_, now, [&] { return lines_.open(lines_port_.path, clock_); }, [&] { lines_.update(now); }));
   // The node says that it is there, and hears who else is. Nothing is armed.
   // Lines that nobody writes yet are no pressed switch.
-  if (bus_.is_open && lines_.kill_closed().active().ok()) actuators_.step(now);
+  if (bus_.is_open && lines_.kill_closed().active().ok()) end_frame(now);
 }
 
 void PortAircraft::look_at_vehicle(MonotonicTime now, std::vector<Need>& needs) const {
@@ -69,6 +70,7 @@ void PortAircraft::look_at_vehicle(MonotonicTime now, std::vector<Need>& needs) 
   needs.push_back(kill);
   needs.push_back({"operator", lines_.hears_operator() ? "" : "is not heard: switch the transmitter on"});
   look_at_power(actuators_, now, needs);
+  hook_and_light_.look(now, needs);
 }
 
 std::vector<Need> PortAircraft::look(MonotonicTime now) {

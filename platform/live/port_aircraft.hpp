@@ -9,6 +9,7 @@
 #include "core/sensor_rig.hpp"
 #include "platform/flight/actuator_side.hpp"
 #include "platform/live/far_end.hpp"
+#include "platform/live/hook_and_light.hpp"
 #include "platform/live/port_look.hpp"
 #include "platform/live/port_pictures.hpp"
 #include "platform/sensor_port/port_bus.hpp"
@@ -20,9 +21,9 @@ namespace roborun::live {
 /// Gate, node, kill switch and arming are those of a vehicle on a CAN bus (flight::ActuatorSide): the bus is two ports.
 class PortAircraft final : public FarEnd {
  public:
-  /// What of `rig` has to be there. Stamps count from `epoch`; the world begins at `origin`, or at the first fix.
+  /// What of `rig` has to be there, and with `needs_hook` a package. Stamps count from `epoch`; the world begins at `origin`, or at the first fix.
   PortAircraft(const std::string& name, const SensorRig& rig, Nanos minor_frame, Nanos epoch,
-               const std::optional<sensor_port::EarthPlace>& origin);
+               const std::optional<sensor_port::EarthPlace>& origin, bool needs_hook);
   PortAircraft(const PortAircraft&) = delete;
   PortAircraft& operator=(const PortAircraft&) = delete;
 
@@ -54,7 +55,15 @@ class PortAircraft final : public FarEnd {
   }
   void terminate() noexcept override { actuators_.terminate(); }
   void disarm() noexcept override { actuators_.disarm(); }
-  void end_frame(MonotonicTime now) noexcept override { actuators_.step(now); }
+  void end_frame(MonotonicTime now) noexcept override {
+    actuators_.step(now);
+    hook_and_light_.step(now, flown_, flown_.height_m);
+  }
+  void is_flown(const flight::Flown& flown) noexcept override { flown_ = flown; }
+  void release_package() noexcept override { hook_and_light_.release(); }
+  [[nodiscard]] std::uint64_t packages_released() const noexcept override {
+    return hook_and_light_.released();
+  }
 
  private:
   struct NoGnss final : firmware_if::Gnss {
@@ -79,6 +88,8 @@ class PortAircraft final : public FarEnd {
   std::string speaks_;  ///< What is wrong with the port that is written to; empty: nothing.
   NoGnss no_gnss_;
   flight::ActuatorSide actuators_;
+  HookAndLight hook_and_light_;
+  flight::Flown flown_{};
 };
 
 }  // namespace roborun::live

@@ -191,6 +191,7 @@ class MissionRun {
   void record_goals();
   /// Gives the goals of a route, and does what is done at them: as live::LiveRun.
   void follow_route(std::uint64_t frame);
+  [[nodiscard]] std::uint64_t packages_released() const;
   /// Throws InputError for a planner of somebody else's that does not say what it does.
   void refuse_silence() const;
   void record_decision(const flight::DecisionOutput& out);
@@ -376,7 +377,7 @@ void MissionRun::follow_route(std::uint64_t frame) {
   const Vector3 p_W = state.p_WB + state.shift_W;
   const bool is_there = flight::is_at_goal((p_W - route_goal_W_).norm(), state.v_WB.norm());
   const std::size_t at = route_->done();
-  const RouteFlight::Order order = route_->step(now_s, p_W, is_there);
+  const RouteFlight::Order order = route_->step(now_s, p_W, is_there, packages_released());
   if (order.speed_mps) cap_mps_.store(*order.speed_mps, std::memory_order_relaxed);
   if (order.releases && autopilot_) autopilot_->companion().release_package();
   if (order.goal_W) {
@@ -388,10 +389,13 @@ void MissionRun::follow_route(std::uint64_t frame) {
   judge_.on_route(route_->is_done(), route_->holds(), now);
 }
 
+std::uint64_t MissionRun::packages_released() const {
+  return autopilot_ ? autopilot_->companion().counters().releases : 0;
+}
+
 void MissionRun::record_goals() {
   if (route_) {
-    const std::uint64_t released = autopilot_ ? autopilot_->companion().counters().releases : 0;
-    report_.result.route = {config_.route->steps.size(), route_->done(), released};
+    report_.result.route = {config_.route->steps.size(), route_->done(), packages_released()};
     if (route_->is_done()) return;
     const Vector3& p_W = aircraft_.vehicle().state().p_WB;
     report_.result.goals.push_back({route_goal_W_, report_.result.reason,

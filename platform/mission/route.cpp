@@ -26,6 +26,10 @@ const Vector3& Route::first_W() const {
           })->goal_W;
 }
 
+bool Route::releases() const {
+  return std::any_of(steps.begin(), steps.end(), [](const RouteStep& s) { return s.releases; });
+}
+
 void check_route(const Route& route, const Aabb& bounds_W, const core::Fence& fence, double room_m) {
   RouteStep first;
   first.where = "take-off";
@@ -55,7 +59,8 @@ governor::Decision SpeedCap::decide(const SpaceProfile& profile,
   return decision;
 }
 
-RouteFlight::Order RouteFlight::step(double now_s, const Vector3& p_W, bool is_there) {
+RouteFlight::Order RouteFlight::step(double now_s, const Vector3& p_W, bool is_there,
+                                     std::uint64_t released) {
   constexpr double kRelease_s = 2.0;  // until it has fallen clear
   Order order;
   if (!home_W_) home_W_ = p_W;
@@ -64,6 +69,8 @@ RouteFlight::Order RouteFlight::step(double now_s, const Vector3& p_W, bool is_t
   if (!begun_) {
     begun_ = true;
     there_s_.reset();
+    released_s_.reset();
+    released_before_ = released;
     order.goal_W = step.goal_W;
     if (step.returns) order.goal_W = Vector3(home_W_->x(), home_W_->y(), step.goal_W->z());
     order.speed_mps = step.speed_mps;
@@ -72,8 +79,10 @@ RouteFlight::Order RouteFlight::step(double now_s, const Vector3& p_W, bool is_t
     there_s_ = now_s;
   }
   if (!there_s_ && is_there) there_s_ = now_s;
-  const double wait_s = step.hold_s + (step.releases ? kRelease_s : 0.0);
-  if (there_s_ && now_s - *there_s_ >= wait_s) {
+  if (released > released_before_ && !released_s_) released_s_ = now_s;
+  const bool has_fallen = !step.releases || (released_s_ && now_s - *released_s_ >= kRelease_s);
+  const double waited_s = there_s_ ? now_s - *there_s_ : -1.0;
+  if (waited_s >= (has_fallen ? step.hold_s : kMostRelease_s)) {
     ++at_;
     begun_ = false;
     there_s_.reset();

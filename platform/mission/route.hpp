@@ -31,6 +31,7 @@ struct Route {
 
   [[nodiscard]] Aabb box_W() const;  ///< Around its goals and the first hover.
   [[nodiscard]] const Vector3& first_W() const;
+  [[nodiscard]] bool releases() const;  ///< The package, somewhere.
 };
 
 /// Throws InputError for the first goal that is not inside of bounds and fence with so much room.
@@ -67,9 +68,11 @@ class RouteFlight {
     bool releases{false};
   };
   explicit RouteFlight(const Route& route) : route_(route) {}
-  /// `is_there`: at the goal of now, and standing. Called again and again once the first hover is over; goals must be obeyed in
-  /// the order of their giving.
-  [[nodiscard]] Order step(double now_s, const Vector3& p_W, bool is_there);
+  /// A package that has not been let go by then stays on its hook, and the route goes on.
+  static constexpr double kMostRelease_s = 10.0;
+  /// `is_there`: at the goal of now, and standing. `released`: packages by now, as the vehicle confirms. Called again and again
+  /// once the first hover is over; goals must be obeyed in the order of their giving.
+  [[nodiscard]] Order step(double now_s, const Vector3& p_W, bool is_there, std::uint64_t released);
   [[nodiscard]] bool is_done() const noexcept { return at_ == route_.steps.size(); }
   /// Steps that are over.
   [[nodiscard]] std::size_t done() const noexcept { return at_; }
@@ -79,9 +82,11 @@ class RouteFlight {
  private:
   const Route& route_;
   std::size_t at_{0};
-  bool begun_{false};              ///< Step at_.
-  std::optional<double> there_s_;  ///< Since when it is there.
-  std::optional<Vector3> home_W_;  ///< Where the first call found it.
+  bool begun_{false};                 ///< Step at_.
+  std::optional<double> there_s_;     ///< Since when it is there.
+  std::uint64_t released_before_{0};  ///< When the step began.
+  std::optional<double> released_s_;  ///< When it was more.
+  std::optional<Vector3> home_W_;     ///< Where the first call found it.
 };
 
 }  // namespace roborun::mission

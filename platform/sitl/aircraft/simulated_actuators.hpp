@@ -36,8 +36,10 @@ class SimulatedActuators {
   [[nodiscard]] firmware_if::GpioInput& kill_open() noexcept { return open_; }
   [[nodiscard]] firmware_if::GpioInput& kill_closed() noexcept { return closed_; }
 
-  /// Another end of the simulated bus, for what else speaks on it; on the bus from the first call on.
-  [[nodiscard]] firmware_if::CanBus& spare_bus() noexcept { return bus_.port(kSparePort); }
+  /// Other ends of the simulated bus, for what else speaks on it; on the bus from the first call on. Precondition: i < 3.
+  [[nodiscard]] firmware_if::CanBus& spare_bus(std::size_t i = 0) noexcept {
+    return bus_.port(kSparePort + i);
+  }
 
   /// Faults of ESCs, power module, bus and kill switch; null: none. It must outlive the object.
   void connect(const FaultLine* faults) noexcept { faults_ = faults; }

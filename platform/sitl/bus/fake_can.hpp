@@ -56,7 +56,7 @@ class FakeCanPort final : public firmware_if::CanBus {
 /// at 1 Mbit/s). With nobody to acknowledge nothing leaves, and the controller is error-passive.
 class FakeCan {
  public:
-  static constexpr std::size_t kPorts = 8;
+  static constexpr std::size_t kPorts = 9;
 
   FakeCan(std::uint32_t bitrate_bps, std::uint64_t seed) noexcept
       : bitrate_bps_(bitrate_bps), rng_(seed, 0xca9) {}

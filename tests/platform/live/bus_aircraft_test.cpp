@@ -21,7 +21,9 @@ const sensor_port::EarthPlace kOrigin{47.0, 8.0, 400.0};
 class Vehicle {
  public:
   Vehicle(const std::string& name, const SensorRig& rig)
-      : ports_(name), navigation_(rig, ports_, kOrigin, true) {
+      : ports_(name),
+        navigation_(rig, ports_, kOrigin, true),
+        nodes_(far_side_.spare_bus(), kOrigin, rig.gnss) {
     EXPECT_EQ(bus_.speak(ports_.bus_in(), {}), "");
   }
   /// One minor frame.
@@ -29,7 +31,7 @@ class Vehicle {
     now += core::kMinorFrame;
     far_side_.advance(now, 0.9, vehicle_);
     if (has_nodes) {
-      nodes_.step(now, Nanos{0});
+      nodes_.step(now, Nanos{0}, vehicle_);
       firmware_if::ImuSample imu;
       imu.stamp = now;
       imu.specific_force_B_mps2 = {0.0, 0.0, 9.81};
@@ -58,7 +60,7 @@ class Vehicle {
   NavigationPorts navigation_;
   sensor_port::PortCan bus_;
   sitl::SimulatedActuators far_side_{1, {}};
-  SensorNodes nodes_{far_side_.spare_bus(), kOrigin};
+  SensorNodes nodes_;
   sitl::Vehicle vehicle_{{}, {}, Vector3::Zero(), 1};
   std::uint32_t count_{0};
 };
@@ -124,7 +126,8 @@ class BusAircraftTest : public ::testing::Test {
                   core::kMinorFrame,
                   Nanos{0},
                   std::nullopt,
-                  {}};
+                  {},
+                  false};
   std::vector<Need> needs;
   sensor_port::PortCan heard_;
 };
@@ -218,7 +221,7 @@ TEST_F(BusAircraftTest, WithoutABusNothingElseIsAskedFor) {
   EXPECT_EQ(lacks("bus"), name + "-bus-in: No such file or directory: start what writes it");
   EXPECT_EQ(needs.size(), 2U);
   BusAircraft none(kernel_wire("nocan7", Nanos{0}), sensor_port::VehiclePorts(name), rig, core::kMinorFrame,
-                   Nanos{0}, std::nullopt, {});
+                   Nanos{0}, std::nullopt, {}, false);
   EXPECT_NE(none.look(vehicle.now).back().lacks.find("nocan7: "), std::string::npos);
 }
 

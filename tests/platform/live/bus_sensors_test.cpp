@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/geometry/math.hpp"
+#include "platform/live/earth_field.hpp"
 #include "tests/firmware_if/recording_bus.hpp"
 #include "tests/support/limits.hpp"
 #include "tests/support/no_alloc_scope.hpp"
@@ -225,6 +226,92 @@ TEST_F(BusSensorsTest, AHeadingBelongsToTheFixBeforeIt) {
   EXPECT_LE(fix.heading_rad, core::kPi);
 }
 
+/// The earth's field where good_fix() is, on a vehicle that is level and looks so far to the left of east.
+std::array<float, 3> field_frd(double heading_rad) {
+  const Vector3 earth_W = earth_field_gauss(47.0, 8.0);
+  const core::SinCos h = core::sin_cos(heading_rad);
+  return {static_cast<float>(h.cos * earth_W.x() + h.sin * earth_W.y()),
+          static_cast<float>(h.sin * earth_W.x() - h.cos * earth_W.y()), static_cast<float>(-earth_W.z())};
+}
+
+TEST_F(BusSensorsTest, AFixHasTheHeadingOfTheMagnetometerAtItsTime) {
+  sut.set_up(Vector3::UnitZ());
+  hear(good_fix(), 31);
+  ASSERT_TRUE(has_fix());
+  EXPECT_TRUE(std::isnan(fix.heading_rad)) << "where it is was not known before";
+  for (int i = 0; i <= 20; ++i) {  // it turns, 0.05 rad in 10 ms; the fix is kFixAge old
+    nodes.now += milliseconds{8};
+    hear(dc::MagneticFieldStrength2{.sensor_id = 3, .magnetic_field_ga = field_frd(0.05 * i)}, 31);
+    hear(dc::MagneticFieldStrength2{.sensor_id = 4, .magnetic_field_ga = field_frd(-1.0)}, 31);
+  }
+  hear(good_fix(), 31);
+  ASSERT_TRUE(has_fix());
+  EXPECT_NEAR(fix.heading_rad, 0.5, 0.03);
+  EXPECT_NEAR(fix.sigma_heading_rad, 0.07, 1e-3);
+  // Two antennas know better; where they fall silent the magnetometer is there again.
+  hear(dc::GnssHeading{true, true, 0.0F, 0.02F}, 31);
+  hear(good_fix(), 31);
+  ASSERT_TRUE(has_fix());
+  EXPECT_TRUE(std::isnan(fix.heading_rad));
+  nodes.now += milliseconds{1000};
+  hear(dc::MagneticFieldStrength{.magnetic_field_ga = field_frd(0.9)}, 31);
+  nodes.now += milliseconds{100};
+  hear(good_fix(), 31);
+  ASSERT_TRUE(has_fix());
+  EXPECT_NEAR(fix.heading_rad, 0.9, 1e-2);
+  nodes.now += milliseconds{300};
+  hear(good_fix(), 31);
+  ASSERT_TRUE(has_fix());
+  EXPECT_TRUE(std::isnan(fix.heading_rad)) << "nothing was measured near its time";
+}
+
+TEST_F(BusSensorsTest, AMagnetometerIsAskedForTheEarthsField) {
+  EXPECT_NE(lacks("heading").find("MagneticFieldStrength (a magnetometer)"), std::string::npos);
+  hear(dc::MagneticFieldStrength{.magnetic_field_ga = field_frd(0.5)}, 31);
+  EXPECT_EQ(lacks("heading"), "its magnetometer waits for a fix, and for an IMU at rest");
+  hear(good_fix(), 31);
+  sut.set_up(Vector3::UnitZ());
+  hear(dc::MagneticFieldStrength{.magnetic_field_ga = {0.6F, 0.0F, 0.6F}}, 31);
+  EXPECT_EQ(
+      lacks("heading"),
+      "node 31: what it says of MagneticFieldStrength is not the earth's field here: calibrate it, and look "
+      "for steel, magnets and cables near it");
+  hear(dc::MagneticFieldStrength{.magnetic_field_ga = field_frd(0.5)}, 31);
+  EXPECT_EQ(lacks("heading"), "");
+  EXPECT_EQ(use("magnetometer").frames, 1U);
+  EXPECT_EQ(use("magnetometer").dropped, 1U);
+  nodes.now += milliseconds{700};
+  EXPECT_NE(lacks("heading").find("its newest MagneticFieldStrength is 0.7 s old"), std::string::npos);
+}
+
+TEST_F(BusSensorsTest, ARangeFinderThatLooksDownSaysTheHeight) {
+  const auto with = [&](std::uint8_t kind, float range_m, int pitch = -8) {
+    dc::RangeMeasurement m;
+    m.reading_type = kind;
+    m.range = range_m;
+    m.beam_orientation_in_body_frame = {{0, static_cast<std::int8_t>(pitch), 0}, true};
+    hear(m, 40);
+    return sut.height_m(nodes.now);
+  };
+  EXPECT_EQ(sut.height_m(nodes.now), std::nullopt) << "there is none";
+  EXPECT_EQ(lacks("range"), "not in the list") << "it need not have one";
+  EXPECT_TRUE(std::isnan(*with(1, 2.0F))) << "how it leans is not known";
+  sut.set_up(Vector3(0.0, 0.6, 0.8));
+  EXPECT_TRUE(std::isnan(*with(1, 2.0F))) << "it looks to the side";
+  sut.set_up(Vector3(std::sqrt(1.0 - 0.95 * 0.95), 0.0, 0.95));
+  EXPECT_NEAR(*with(1, 2.0F), 1.9, 1e-3);
+  EXPECT_NEAR(*with(0, 4.0F), 3.8, 1e-3);
+  EXPECT_EQ(*with(2, 0.0F), 0.0);
+  EXPECT_EQ(lacks("range"), "");
+  EXPECT_EQ(*with(3, 0.0F), test::kInfinity);
+  for (const auto& bad : {with(1, kNanF), with(1, -1.0F), with(4, 1.0F), with(1, 1.0F, 0)})
+    EXPECT_TRUE(std::isnan(*bad));
+  EXPECT_EQ(lacks("range"), "node 40: what it says of range_sensor.Measurement is not of what is below");
+  EXPECT_TRUE(std::isfinite(*with(1, 5.0F)));
+  EXPECT_EQ(lacks("range"), "node 40: measures 5.0 m on the ground: it must look down");
+  EXPECT_TRUE(std::isnan(*sut.height_m(nodes.now + milliseconds{501})));
+}
+
 TEST_F(BusSensorsTest, StampsAreTheMessagesOwnOnceTheBusHasATime) {
   const Nanos ahead{77'000'000'000};
   const auto usec = [&](MonotonicTime t) {
@@ -311,8 +398,7 @@ TEST_F(BusSensorsTest, SaysWhatIsMissingBeforeAFlight) {
 
 TEST_F(BusSensorsTest, WhatOthersSayIsNothing) {
   hear(dc::EscStatus{});
-  hear(dc::RangeMeasurement{});
-  hear(dc::MagneticFieldStrength2{});
+  hear(dc::StaticTemperature{});
   EXPECT_EQ(use("imu").frames + use("gnss").frames + use("pressure").frames, 0U);
   EXPECT_EQ(use("imu").dropped + use("gnss").dropped + use("pressure").dropped, 0U);
 }

@@ -51,7 +51,7 @@ class GroundTest : public ::testing::Test {
   }
 
   LinkAddress ear_ = ear();
-  PortAircraft far_{"nobody", SensorRig{}, Nanos{2'500'000}, Nanos{0}, kLocalOrigin};
+  PortAircraft far_{"nobody", SensorRig{}, Nanos{2'500'000}, Nanos{0}, kLocalOrigin, false};
   Ground sut_{GroundConfig{ear_, kGroundStation}, std::nullopt, far_};
   mavlink::Link station_{{LinkAddress::Kind::kUdpOut, "127.0.0.1", ear_.number}};
   MonotonicTime now_{Nanos{1'000'000'000}};

@@ -50,30 +50,50 @@ TEST(RouteFlightTest, DoesOneAfterTheOther) {
   const Route route = route_of(mavlink::load_mission(kMission), kDrawnAt);
   RouteFlight sut(route);
   const Vector3 home_W(1.0, 2.0, 4.0);
-  EXPECT_LT((*sut.step(0.0, home_W, true).goal_W - route.first_W()).norm(), 1e-9);
-  EXPECT_FALSE(sut.step(0.1, home_W, false).goal_W.has_value());
+  EXPECT_LT((*sut.step(0.0, home_W, true, 0).goal_W - route.first_W()).norm(), 1e-9);
+  EXPECT_FALSE(sut.step(0.1, home_W, false, 0).goal_W.has_value());
   EXPECT_FALSE(sut.holds());
-  EXPECT_FALSE(sut.step(9.0, home_W, true).goal_W.has_value());
+  EXPECT_FALSE(sut.step(9.0, home_W, true, 0).goal_W.has_value());
   EXPECT_TRUE(sut.holds()) << "2 s at the first one";
-  (void)sut.step(10.9, home_W, true);
+  (void)sut.step(10.9, home_W, true, 0);
   EXPECT_EQ(sut.done(), 0U);
-  (void)sut.step(11.0, home_W, true);
+  (void)sut.step(11.0, home_W, true, 0);
   EXPECT_EQ(sut.done(), 1U);
-  EXPECT_DOUBLE_EQ(*sut.step(11.1, home_W, true).speed_mps, 2.0);
-  EXPECT_TRUE(sut.step(11.2, home_W, true).goal_W.has_value());
+  EXPECT_DOUBLE_EQ(*sut.step(11.1, home_W, true, 0).speed_mps, 2.0);
+  EXPECT_TRUE(sut.step(11.2, home_W, true, 0).goal_W.has_value());
   EXPECT_EQ(sut.done(), 2U) << "at the goal before is not at this one";
-  (void)sut.step(20.0, home_W, true);
-  EXPECT_TRUE(sut.step(20.1, home_W, true).releases);
-  EXPECT_FALSE(sut.step(20.2, home_W, true).releases) << "once";
-  (void)sut.step(22.2, home_W, true);
-  (void)sut.step(22.3, home_W, true);
-  (void)sut.step(23.4, home_W, true);
-  const auto back = sut.step(23.5, home_W, true);
+  (void)sut.step(20.0, home_W, true, 0);
+  EXPECT_TRUE(sut.step(20.1, home_W, true, 0).releases);
+  EXPECT_FALSE(sut.step(20.2, home_W, true, 0).releases) << "once";
+  (void)sut.step(24.0, home_W, true, 1);
+  (void)sut.step(25.9, home_W, true, 1);
+  EXPECT_EQ(sut.done(), 3U) << "until it has fallen clear";
+  (void)sut.step(26.0, home_W, true, 1);
+  EXPECT_EQ(sut.done(), 4U);
+  (void)sut.step(26.1, home_W, true, 1);
+  (void)sut.step(27.2, home_W, true, 1);
+  const auto back = sut.step(27.3, home_W, true, 1);
   ASSERT_TRUE(back.goal_W.has_value());
   EXPECT_LT((*back.goal_W - home_W).norm(), 1e-9) << "where it took off";
   EXPECT_FALSE(sut.is_done());
-  (void)sut.step(40.0, home_W, true);
+  (void)sut.step(40.0, home_W, true, 1);
   EXPECT_TRUE(sut.is_done());
+}
+
+TEST(RouteFlightTest, GoesOnWithAPackageThatNobodyLetsGo) {
+  Route route;
+  route.steps.resize(3);
+  route.steps[0].goal_W = Vector3(5.0, 0.0, 1.8);
+  route.steps[1].releases = true;
+  route.steps[2].goal_W = Vector3(9.0, 0.0, 4.0);
+  RouteFlight sut(route);
+  (void)sut.step(0.0, Vector3::Zero(), false, 3);
+  (void)sut.step(5.0, Vector3::Zero(), true, 3);
+  EXPECT_TRUE(sut.step(6.0, Vector3::Zero(), true, 3).releases) << "those of before are not of this step";
+  (void)sut.step(15.9, Vector3::Zero(), true, 3);
+  EXPECT_EQ(sut.done(), 1U);
+  (void)sut.step(16.0, Vector3::Zero(), true, 3);
+  EXPECT_EQ(sut.done(), 2U);
 }
 
 }  // namespace

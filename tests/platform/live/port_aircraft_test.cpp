@@ -99,7 +99,7 @@ class PortAircraftTest : public ::testing::Test {
   std::string name = test::scratch("aircraft");
   SensorRig rig = one_camera();
   Feeder feeder{name, rig};
-  PortAircraft sut{name, rig, core::kMinorFrame, Nanos{0}, std::nullopt};
+  PortAircraft sut{name, rig, core::kMinorFrame, Nanos{0}, std::nullopt, false};
   std::vector<Need> needs;
 };
 

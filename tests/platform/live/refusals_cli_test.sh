@@ -67,8 +67,6 @@ says 2 "--link: udpin://nix: no port" run "${fly[@]}" --link udpin://nix --port 
 says 2 "NOT READY autopilot: no autopilot was heard" run "${fly[@]}" --link "$url" --port "$name" --autopilot px4
 says 2 "--goal, --mission: must be one of both" run "${fly[@]}" --link "port:$name" --mission x
 says 2 "nix: cannot be opened: must be a mission" run --link "port:$name" --mission nix
-says 2 "item 5: gripper: goes with an autopilot" run --link "port:$name" --profile paper \
-  --mission "$root/tests/data/missions/two_pillars.plan" --bounds=-10,-15,1.5,70,15,8
 says 2 "item 4: (60.00," run --link "$url" --port "$name" --autopilot px4 --profile paper \
   --mission "$root/tests/data/missions/two_pillars.plan" --bounds=-10,-15,1.5,50,15,8
 says 2 "--guard: commands nothing" run "${fly[@]}" --link "$url" --port "$name" --guard

@@ -10,14 +10,14 @@ name=$(basename "$folder")
 plant= run= feeder= bridge=
 trap 'kill -9 $plant $run $feeder $bridge 2>/dev/null; rm -rf "$folder" /dev/shm/roborun-$name-*' EXIT
 
-link="port:$name"
+link="port:$name" goal="--goal 60,0,4"
 elsewhere=
 start() {  # OPTION_OF_PLANT..: both, in a world of 60 m
   rm -f "$folder"/*.json
   $elsewhere "$roborun" plant --world "$root/tests/data/worlds/two_pillars.toml" --port "$name" --seconds 240 --json "$@" \
     >"$folder/plant.json" 2>"$folder/plant.err" &
   plant=$!
-  "$roborun" run --vehicle paper --link "$link" --goal 60,0,4 --bounds -10,-15,1.5,70,15,8 --profile paper \
+  "$roborun" run --vehicle paper --link "$link" $goal --bounds -10,-15,1.5,70,15,8 --profile paper \
     --best-effort --wait 60 --seconds 120 --json >"$folder/run.json" 2>"$folder/run.err" &
   run=$!
 }
@@ -36,12 +36,18 @@ reaches_the_goal() {
   ends 0 $run && ends 0 $plant && is True run reached_goal && is landed run ended && is True plant reached_goal &&
     is False plant collided && is landed plant reason && is 0 run heap_calls_after_start
 }
-# The same with everything but cameras and lines on one DroneCAN bus, where an operator proves the kill switch and arms.
+# The same with everything but cameras and lines on one DroneCAN bus, where an operator proves the kill switch and arms; on the way it
+# leaves a package, 1.8 m above the ground by its range finder.
 flies_over_the_bus() {
-  local link="dronecan:port:$name"
+  local link="dronecan:port:$name" goal="--mission $root/tests/data/missions/delivery.waypoints"
   start --bus-sensors
   ends 0 $run && ends 0 $plant && is True run reached_goal && is landed run ended && is True plant reached_goal &&
-    is False plant collided && is landed plant reason && is 0 run heap_calls_after_start
+    is False plant collided && is landed plant reason && is 0 run heap_calls_after_start && is 1 run mission.released &&
+    falls plant package
+}
+falls() {  # FILE PATH: no deeper than 2 m, measured within 0.15 m, and hardly moving
+  python3 -c 'import sys; h, v = map(float, sys.argv[1:]); sys.exit(not (0.5 < h < 2.15 and v < 0.6))' \
+    "$(value "$1" "$2.height_m")" "$(value "$1" "$2.speed_mps")" || { echo "the package falls wrongly"; return 1; }
 }
 # Its IMU, receiver, barometer, ESCs and battery die together.
 switches_off_without_a_bus() {
