@@ -96,12 +96,12 @@ int feed_files(const FeedFilesOptions& options) {
 
 int feed_plant(const PlantArguments& arguments) {
   live::PictureFeed config;
-  config.mission = plant_mission(arguments);
+  const PlantScene scene = plant_scene(arguments);
+  config.mission = scene.mission;
   config.port = arguments.port;
-  const sitl::World world = plant_world(arguments, config.mission);
   const input::StopOnSignal stop;
   config.stop = &input::StopOnSignal::requested;
-  const std::uint64_t sent = live::feed_pictures(world, config);
+  const std::uint64_t sent = live::feed_pictures(scene.world, config);
   fmt::print("{} pictures sent\n", sent);
   return input::StopOnSignal::requested() ? kInterrupted : kDone;
 }
@@ -111,7 +111,8 @@ void add_feed_plant(CLI::App& feed, std::function<int()>& run) {
   CLI::App* plant =
       feed.add_subcommand("plant", "What the cameras and LiDARs of a plant see, as a process of its own");
   plant->footer(
-      "With the plant's own vehicle, world and seed. Ends with the plant; may be started again in flight.\n\n"
+      "With the plant's own vehicle, world and seed, or its scenario. Ends with the plant; may be started "
+      "again in flight.\n\n"
       "Example, in three terminals:\n"
       "  roborun plant --env 14 --port demo --no-pictures\n"
       "  roborun feed plant --env 14 --port demo\n"

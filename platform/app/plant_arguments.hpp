@@ -15,13 +15,20 @@ struct PlantArguments {
   std::string world;
   WorldArguments in_file;
   std::string seed{"1"};
+  std::string scenario;
   std::string port;
 };
 
-/// Adds --vehicle, --env, --world and what goes with it, --seed and --port. `arguments` must outlive the command.
+/// What flies, where, and what fails.
+struct PlantScene {
+  mission::MissionConfig mission;
+  std::string vehicle;  ///< As `run` is told of it.
+  sitl::World world;
+};
+
+/// Adds --vehicle, --env, --world and what goes with it, --seed, --scenario and --port. `arguments` must outlive the command.
 void add_plant_arguments(CLI::App& command, PlantArguments& arguments);
-/// The vehicle and the seed. Throw InputError that names the option.
-[[nodiscard]] mission::MissionConfig plant_mission(const PlantArguments& arguments);
-[[nodiscard]] sitl::World plant_world(const PlantArguments& arguments, const mission::MissionConfig& mission);
+/// Throws InputError that names the option.
+[[nodiscard]] PlantScene plant_scene(const PlantArguments& arguments);
 
 }  // namespace roborun::app

@@ -73,10 +73,11 @@ std::string link_to(const PlantOptions& options, const live::PlantConfig& config
 }
 
 /// What flies in this world.
-std::string run_line(const PlantOptions& options, const sitl::World& world, const live::PlantConfig& config) {
+std::string run_line(const PlantOptions& options, const PlantScene& scene, const live::PlantConfig& config) {
+  const sitl::World& world = scene.world;
   const std::string link = link_to(options, config);
   std::string line =
-      fmt::format("roborun run --vehicle {} --link {} --goal {} --bounds={},{}", options.common.vehicle, link,
+      fmt::format("roborun run --vehicle {} --link {} --goal {} --bounds={},{}", scene.vehicle, link,
                   text_of(world.goal_W()), text_of(world.bounds_W().min_W), text_of(world.bounds_W().max_W));
   if (world.start_W().z() != world.goal_W().z()) line += fmt::format(" --cruise {:g}", world.start_W().z());
   // The runtime's world begins where the vehicle stands, or with the autopilot's frame.
@@ -98,6 +99,7 @@ void print(const live::PlantReport& r, bool json) {
     j["stood_still_s"] = r.stood_still_s;
     j["commands"] = r.commands;
     j["speed_mps"] = r.speed_mps;
+    j["injected"] = r.injected;
     if (r.autopilot)
       j["autopilot"] = {{"mode", r.autopilot->mode},
                         {"armed", r.autopilot->armed},
@@ -125,6 +127,7 @@ void print(const live::PlantReport& r, bool json) {
              : r.physics ? "steps"
                          : "bus frames",
              r.faults);
+  if (r.injected > 0) fmt::print("{} faults of the scenario began\n", r.injected);
   if (r.package)
     fmt::print("the package left its hook {:.2f} m above the ground, at {:.2f} m/s\n", r.package->height_m,
                r.package->speed_mps);
@@ -165,7 +168,6 @@ std::optional<live::PlantPhysics> physics_of(const PlantOptions& options) {
 
 int plant(const PlantOptions& options) {
   live::PlantConfig config;
-  config.mission = plant_mission(options.common);
   config.port = options.common.port;
   config.pictures = !options.no_pictures;
   if (const auto origin = origin_of(options.origin)) config.origin = *origin;
@@ -177,15 +179,16 @@ int plant(const PlantOptions& options) {
     config.on_bus = {options.can};
   }
   if (options.seconds > 0.0) config.seconds = options.seconds;
-  const sitl::World world = plant_world(options.common, config.mission);
+  const PlantScene scene = plant_scene(options.common);
+  config.mission = scene.mission;
   const input::StopOnSignal stop;
   config.stop = &input::StopOnSignal::requested;
   std::optional<report::ProgressLine> line(std::in_place);
   const live::PlantReport result = live::run_plant(
-      world, config,
+      scene.world, config,
       [&] {
         fmt::print(stderr, "{}roborun: plant {} runs: {}\n", physics_line(config), options.common.port,
-                   run_line(options, world, config));
+                   run_line(options, scene, config));
       },
       [&](const live::PlantProgress& p) {
         if (line->due())
@@ -215,6 +218,11 @@ void add_plant_command(CLI::App& app, std::function<int()>& run) {
       "Example, in two terminals:\n"
       "  roborun plant --vehicle paper --env 14 --seed 1 --port demo\n"
       "  roborun run --vehicle paper --link port:demo --goal 900,0,5 --bounds=-100,-100,1.5,1000,100,10\n\n"
+      "With --scenario FILE its sensors, bus, motors, kill switch and cameras fail as the file says; time of "
+      "a fault "
+      "without a\nphase counts from leaving the ground. What becomes of it the flight itself has to tell "
+      "(run "
+      "--json).\n\n"
       "Exit code: 0 done, 1 the vehicle collided, 2 bad input, or ports that cannot be made, 130 "
       "interrupted.");
   add_plant_arguments(*command, options->common);

@@ -41,7 +41,7 @@ struct RunOptions {
   std::string autopilot{"none"};
   bool tune{false};
   bool arm{false};
-  bool guard{false};
+  bool guard{false}, limits_speed{false};
   std::vector<std::string> kill_lines;
   std::string arm_line;
   bool active_low{false}, pull_up{false};
@@ -271,9 +271,10 @@ int run_flight(const RunOptions& options) {
       throw InputError(
           "--guard: signs nothing, and logs nothing: must go without --signing-key, --ground, --log and "
           "--live");
-    return run_guard(
-        {options.vehicle, options.link, options.port, options.seconds, options.wait_s, options.json});
+    return run_guard({options.vehicle, options.link, options.port, options.seconds, options.wait_s,
+                      options.limits_speed, options.json});
   }
+  if (options.limits_speed) throw InputError("--limit-speed: goes with --guard");
   input::check_outputs({{"--log", options.log}}, {options.vehicle, options.mission, options.profile});
   if (options.live && options.log.empty())
     throw InputError("--live: shows the log while it is written: must go with --log FILE.mcap");
@@ -393,6 +394,10 @@ void add_run_command(CLI::App& app, std::function<int()>& run) {
   command->add_flag(
       "--guard", options->guard,
       "Only tell the autopilot what the cameras see (OBSTACLE_DISTANCE, 10 Hz); the pilot flies");
+  command->add_flag(
+      "--limit-speed", options->limits_speed,
+      "With --guard: also tell it no faster than it can stop where it sees (DO_CHANGE_SPEED, for "
+      "missions and guided flight)");
   command->add_flag(
       "--arm", options->arm,
       "Take the autopilot's mode and arm it, for simulators and without propellers; default: the "

@@ -20,8 +20,10 @@ constexpr double kBesides_m = 0.3;  // of the body: what wind and pilot make of 
 
 void print(const live::GuardReport& r, bool json) {
   if (!json) {
-    fmt::print("{} messages in {:.1f} s, {} not sent; nearest {}\n", r.messages, r.time_s, r.not_sent,
-               std::isfinite(r.nearest_m) ? fmt::format("{:.2f} m", r.nearest_m) : "nothing");
+    fmt::print(
+        "{} messages in {:.1f} s, {} not sent; nearest {}{}\n", r.messages, r.time_s, r.not_sent,
+        std::isfinite(r.nearest_m) ? fmt::format("{:.2f} m", r.nearest_m) : "nothing",
+        r.limit_mps ? fmt::format("; {} speed limits, the last one {:.1f} m/s", r.limits, *r.limit_mps) : "");
     return;
   }
   nlohmann::ordered_json ports = nlohmann::ordered_json::array();
@@ -30,6 +32,7 @@ void print(const live::GuardReport& r, bool json) {
         {{"device", port.device}, {"frames", port.frames}, {"dropped", port.dropped}, {"stale", port.stale}});
   nlohmann::ordered_json j{{"time_s", r.time_s}, {"messages", r.messages}, {"not_sent", r.not_sent}};
   j["nearest_m"] = std::isfinite(r.nearest_m) ? nlohmann::ordered_json(r.nearest_m) : nullptr;
+  if (r.limit_mps) j["speed_limit"] = {{"sent", r.limits}, {"last_mps", *r.limit_mps}};
   j["port"] = ports;
   fmt::print("{}\n", j.dump());
 }
@@ -45,6 +48,8 @@ int run_guard(const GuardOptions& options) {
   const vehicle::Vehicle vehicle = vehicle::load_vehicle(options.vehicle);
   config.rig = vehicle.rig;
   config.band_m = vehicle.model.radius_m + kBesides_m;
+  if (options.limits_speed)
+    config.limit = {stopping_model(vehicle.model), vehicle.model.radius_m, vehicle.model.speed_mps};
   config.seconds = options.seconds;
   config.wait_s = options.wait_s;
   const input::StopOnSignal stop;

@@ -8,6 +8,7 @@ namespace roborun::app {
 struct GuardOptions {
   std::string vehicle, link, port;
   double seconds{}, wait_s{};
+  bool limits_speed{};
   bool json{};
 };
 

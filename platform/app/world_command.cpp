@@ -15,6 +15,7 @@
 #include "platform/input/input_error.hpp"
 #include "platform/input/output_file.hpp"
 #include "platform/input/text_file.hpp"
+#include "platform/mission/way_picture.hpp"
 #include "platform/report/progress_line.hpp"
 #include "platform/sitl/judge/way_judge.hpp"
 #include "platform/sitl/world/world_maker.hpp"
@@ -63,7 +64,7 @@ int check(const CheckOptions& options) {
     verdict = sitl::judge_way(world, question);
   }
   if (!options.plot.empty())
-    input::write_file(options.plot, sitl::way_svg(world, question.radius_m, verdict, options.world));
+    input::write_file(options.plot, mission::way_svg(world, question.radius_m, verdict, options.world));
   const double straight_m = (world.goal_W() - world.start_W()).norm();
   if (options.json) {
     nlohmann::ordered_json json;

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <thread>
 
+#include "core/geometry/math.hpp"
+#include "core/geometry/yaw.hpp"
 #include "firmware_if/mavlink/flight_messages.hpp"
 #include "firmware_if/mavlink/ned.hpp"
 #include "firmware_if/mavlink/receiver.hpp"
@@ -67,7 +70,9 @@ class Guard {
       if (now >= due) {
         due = std::max(due + kPeriod, now);
         see(now);
-        send(sectors_.message(now), now, report);
+        const ObstacleDistance around = sectors_.message(now);
+        send(around, now, report);
+        if (config_.limit) limit(around, now, report);
         const double nearest_m = sectors_.nearest_m(now);
         report.nearest_m = std::min(report.nearest_m, nearest_m);
         if (progress && now >= told) {
@@ -97,6 +102,28 @@ class Guard {
         sectors_.see(i, frame, pictures_.cameras()[i]->mount(), R_LB);
   }
 
+  /// Once a second, and at once where it falls. It holds in the modes that follow DO_CHANGE_SPEED: missions and guided flight.
+  void limit(const ObstacleDistance& around, MonotonicTime now, GuardReport& report) {
+    constexpr std::uint16_t kChangeSpeed = 178;
+    constexpr std::uint8_t kAutopilot = 1;
+    constexpr float kOverGround = 1.0F, kSameThrottle = -1.0F;
+    constexpr double kFell_mps = 0.5, kStands_mps = 0.5, kAhead_rad = 45.0 * core::kDegree;
+    if (sysid_ == 0) return;
+    const bool moves = now - moved_at_ <= kOldAttitude && now - leans_at_ <= kOldAttitude &&
+                       core::hypot2(north_mps_, east_mps_) > kStands_mps;
+    const double toward_rad = moves ? core::atan2(east_mps_, north_mps_) - yaw_rad_ : 0.0;
+    const double speed_mps = config_.limit->speed_mps(
+        ObstacleSectors::clear_m(around, toward_rad, moves ? kAhead_rad : core::kPi));
+    const bool falls = report.limit_mps && speed_mps < *report.limit_mps - kFell_mps;
+    if (!falls && now < limit_due_) return;
+    limit_due_ = now + kBeat;
+    report.limit_mps = speed_mps;
+    ++report.limits;
+    send(CommandLong{sysid_, kAutopilot, kChangeSpeed, 0, kOverGround, static_cast<float>(speed_mps),
+                     kSameThrottle},
+         now, report);
+  }
+
   /// The system that is guarded is that of the first autopilot. Its clock's questions are answered, and what it says of its
   /// attitude without being asked is believed.
   void hear(MonotonicTime now) {
@@ -122,12 +149,22 @@ class Guard {
     if (frame.header.sysid != sysid_) return;
     if (frame.msgid == kAttitude.id) {
       const auto m = unpack<Attitude>(frame.payload);
-      lean(now, level_of(static_cast<double>(m.roll), static_cast<double>(m.pitch)));
+      lean(now, level_of(static_cast<double>(m.roll), static_cast<double>(m.pitch)),
+           static_cast<double>(m.yaw));
     }
     if (frame.msgid == kAttitudeQuaternion.id) {
       const auto m = unpack<AttitudeQuaternion>(frame.payload);
       const auto v = wide(m.q2, m.q3, m.q4);
-      lean(now, level_of(std::array{static_cast<double>(m.q1), v[0], v[1], v[2]}));
+      const std::array q{static_cast<double>(m.q1), v[0], v[1], v[2]};
+      lean(now, level_of(q), core::yaw_of(Quaternion(q[0], q[1], q[2], q[3])));
+    }
+    if (frame.msgid == kLocalPositionNed.id) {
+      const auto m = unpack<LocalPositionNed>(frame.payload);
+      if (std::isfinite(m.vx) && std::isfinite(m.vy)) {
+        north_mps_ = static_cast<double>(m.vx);
+        east_mps_ = static_cast<double>(m.vy);
+        moved_at_ = now;
+      }
     }
     if (frame.msgid != kTimesync.id) return;
     const auto question = unpack<Timesync>(frame.payload);
@@ -136,9 +173,10 @@ class Guard {
       send(Timesync{now.time_since_epoch().count(), question.ts1, sysid_, kAutopilot}, now, none);
   }
 
-  void lean(MonotonicTime now, const Matrix3& R_LB) {
-    if (!R_LB.allFinite()) return;
+  void lean(MonotonicTime now, const Matrix3& R_LB, double yaw_rad) {
+    if (!R_LB.allFinite() || !std::isfinite(yaw_rad)) return;
     R_LB_ = R_LB;
+    yaw_rad_ = yaw_rad;
     leans_at_ = now;
   }
 
@@ -163,10 +201,21 @@ class Guard {
   std::uint8_t seq_{0}, sysid_{0};
   std::uint64_t messages_{0};
   Matrix3 R_LB_ = Matrix3::Identity();
-  MonotonicTime leans_at_{-2 * kOldAttitude};
+  double yaw_rad_{0.0}, north_mps_{0.0}, east_mps_{0.0};  ///< Clockwise from north; over ground.
+  MonotonicTime leans_at_{-2 * kOldAttitude}, moved_at_{-2 * kOldAttitude}, limit_due_{};
 };
 
 }  // namespace
+
+double GuardSpeedLimit::speed_mps(double clear_m) const noexcept {
+  // Where the distance of the stop is that of what is clear: a x^2 + b x + c = 0.
+  const double a = stopping.quadratic_s2pm, b = stopping.linear_s + kLatency_s;
+  const double c = stopping.constant_m - std::max(clear_m - radius_m, 0.0);
+  const double under = b * b - 4.0 * a * c;
+  // The root that also holds where it does not brake (a is 0).
+  const double speed_mps = under > 0.0 ? -2.0 * c / (b + std::sqrt(under)) : 0.0;
+  return std::clamp(speed_mps, std::min(kLeast_mps, v_max_mps), v_max_mps);
+}
 
 GuardReport run_guard(const GuardConfig& config,
                       const std::function<void(double time_s, double nearest_m)>& progress) {

@@ -89,6 +89,22 @@ double ObstacleSectors::nearest_m(MonotonicTime now) const {
   return nearest_m;
 }
 
+double ObstacleSectors::clear_m(const firmware_if::mavlink::ObstacleDistance& message, double clockwise_rad,
+                                double half_rad) {
+  constexpr std::size_t kMostUnknown = 5;  // one in so many: single silent pixels make a sector unknown
+  double clear_cm = message.max_distance;
+  std::size_t count = 0, unknown = 0;
+  for (std::size_t i = 0; i < kSectors; ++i) {
+    const double beside_rad = core::wrap_angle(5.0 * core::kDegree * static_cast<double>(i) - clockwise_rad);
+    if (std::fabs(beside_rad) > half_rad) continue;
+    const std::uint16_t distance_cm = message.distances.at(i);
+    ++count;
+    unknown += distance_cm == kUnknown ? 1 : 0;
+    clear_cm = std::min(clear_cm, static_cast<double>(distance_cm));
+  }
+  return unknown * kMostUnknown <= count ? 0.01 * clear_cm : 0.0;
+}
+
 firmware_if::mavlink::ObstacleDistance ObstacleSectors::message(MonotonicTime now) const {
   constexpr double kMost_cm = 65000.0;
   double least_m = 0.0, most_m = kMost_cm / 100.0;

@@ -32,6 +32,10 @@ class ObstacleSectors {
            const Matrix3& R_LB = Matrix3::Identity());
   /// As it is to be sent at `now`; ranges are the least far of the cameras. Body frame (12), right for PX4 and ArduPilot.
   [[nodiscard]] firmware_if::mavlink::ObstacleDistance message(MonotonicTime now) const;
+  /// As far as nothing is, in sectors of the message that are at most `half_rad` beside `clockwise_rad` from straight ahead, m: the
+  /// nearest hit, or the range; 0 if more than a fifth of them is not known.
+  [[nodiscard]] static double clear_m(const firmware_if::mavlink::ObstacleDistance& message,
+                                      double clockwise_rad, double half_rad);
   /// The nearest hit at `now`, m; +infinity: none.
   [[nodiscard]] double nearest_m(MonotonicTime now) const;
 

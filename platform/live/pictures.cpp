@@ -20,15 +20,17 @@ std::vector<std::size_t> points_of(const sitl::CameraRig& rig, std::size_t lidar
 
 Pictures::Pictures(const sitl::World& world, const mission::MissionConfig& config, const std::string& port)
     : rig_(world, config.simulator, config.seed),
+      faults_(config, world.start_W().z()),
+      cameras_(faults_.connect(rig_.cameras())),
       ports_(sitl::rig_of(config.simulator), points_of(rig_, sitl::rig_of(config.simulator).lidars.size()),
              sensor_port::VehiclePorts(port)) {}
 
 std::uint64_t Pictures::send(Nanos shift) noexcept {
   std::uint64_t sent = 0;
   firmware_if::DepthFrame frame;
-  for (std::size_t i = 0; i < rig_.cameras().size(); ++i)
-    if (rig_.cameras()[i]->read(frame) == Status::kOk) {
-      ports_.write(i, frame, rig_.cameras()[i]->mount(), shift);
+  for (std::size_t i = 0; i < cameras_.size(); ++i)
+    if (cameras_[i]->read(frame) == Status::kOk) {
+      ports_.write(i, frame, cameras_[i]->mount(), shift);
       ++sent;
     }
   firmware_if::LidarSweep sweep;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <string>
 
+#include "platform/live/plant_faults.hpp"
 #include "platform/live/plant_ports.hpp"
 #include "platform/mission/mission_config.hpp"
 #include "platform/sitl/aircraft/camera_rig.hpp"
@@ -16,12 +17,17 @@ class Pictures {
  public:
   /// Makes the ports. `world` must outlive it. Throws InputError.
   Pictures(const sitl::World& world, const mission::MissionConfig& config, const std::string& port);
-  void expose(MonotonicTime now, const Pose& X_WB) noexcept { rig_.expose(now, X_WB); }
+  void expose(MonotonicTime now, const Pose& X_WB) noexcept {
+    rig_.expose(now, X_WB);
+    faults_.advance(now, X_WB.p_RT.z());
+  }
   /// Renders and writes what is due; how many that were. Stamps become CLOCK_MONOTONIC by `shift`.
   std::uint64_t send(Nanos shift) noexcept;
 
  private:
   sitl::CameraRig rig_;
+  PlantFaults faults_;
+  std::vector<firmware_if::DepthCamera*> cameras_;  ///< Behind their faults.
   PicturePorts ports_;
 };
 

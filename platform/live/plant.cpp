@@ -15,6 +15,7 @@
 #include "platform/flight/goal_queue.hpp"
 #include "platform/input/input_error.hpp"
 #include "platform/live/pictures.hpp"
+#include "platform/live/plant_faults.hpp"
 #include "platform/live/plant_ports.hpp"
 #include "platform/live/plant_side.hpp"
 #include "platform/rt/lane_thread.hpp"
@@ -109,6 +110,7 @@ class Plant {
   std::unique_ptr<PhysicsLink> physics_;    ///< Null: this machine's clock steps the world.
   PictureThread pictures_;
   TruthPort truth_;
+  PlantFaults faults_;
   sitl::SimulatedAircraft aircraft_;
   sitl::SimulatedPlant& plant_{aircraft_.plant()};
   std::unique_ptr<PlantSide> side_;  ///< Null: there is physics_.
@@ -133,6 +135,7 @@ Plant::Plant(const sitl::World& world, const PlantConfig& config)
       physics_(config.physics ? physics_link(*config.physics, config.origin) : nullptr),
       pictures_(world, config),
       truth_(names_),
+      faults_(config.mission, world.start_W().z()),
       aircraft_(flight_.vehicle, config.mission.simulator, mission::ground_below(world), config.mission.seed,
                 flight_.minor_frame, pictures_),
       side_(config.physics     ? nullptr
@@ -141,6 +144,7 @@ Plant::Plant(const sitl::World& world, const PlantConfig& config)
                                : port_side(aircraft_, sitl::rig_of(config.mission.simulator), names_,
                                            config.origin, config.on_bus, std::move(kernel_))) {
   plant_.stand_in(world);
+  if (!faults_.empty()) plant_.connect(faults_.line());
 }
 
 void Plant::step(MonotonicTime now) {
@@ -149,6 +153,10 @@ void Plant::step(MonotonicTime now) {
     if (!first_word_) first_word_ = plant_.now();
   }
   const Vector3 before_W = plant_.vehicle().state().p_WB;
+  if (!faults_.empty()) {
+    faults_.advance(plant_.now(), before_W.z());
+    plant_.set_mean_wind(faults_.mean_wind_W_mps());
+  }
   plant_.step();
   report_.distance_m += (plant_.vehicle().state().p_WB - before_W).norm();
   const Nanos shift = clock_.epoch() + held_;
@@ -275,6 +283,7 @@ PlantReport Plant::run(const std::function<void(const PlantProgress&)>& progress
   if (left_ground_) report_.least_clearance_m = clearance_m_;
   report_.frames_sent = pictures_.sent();
   report_.faults = stalls_ + pictures_.lost() + (side_ ? side_->lost() : 0);
+  report_.injected = faults_.begun();
   report_.speed_mps = plant_.vehicle().state().v_WB.norm();
   if (side_) {
     report_.commands = side_->commands();

@@ -44,6 +44,7 @@ struct PlantReport {
   double stood_still_s{};
   std::uint64_t commands{};  ///< Frames heard on the bus, set-points, or steps of a real autopilot.
   double speed_mps{};        ///< At the end.
+  std::size_t injected{};    ///< Faults of a scenario that began.
   std::optional<PlantAutopilotReport> autopilot{};
   std::optional<PlantPackage> package{};  ///< None: it hangs on the hook, or there is none.
   std::optional<PhysicsCounters> physics{};

@@ -23,7 +23,7 @@ bool MissionFaults::advance(MonotonicTime now, governor::Phase phase) {
   const bool before = any_;
   for (std::size_t i = 0; i < begun_.size(); ++i) {
     const TimedFault& f = config_.faults[i];
-    const auto from = f.phase ? phase_begin_[static_cast<std::size_t>(*f.phase)] : MonotonicTime{};
+    const auto from = f.phase ? phase_begin_[static_cast<std::size_t>(*f.phase)] : start_;
     if (begun_[i] || !from || seconds(now - *from) < f.at_s) continue;
     begun_[i] = true;
     any_ = true;

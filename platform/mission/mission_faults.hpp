@@ -1,6 +1,7 @@
 /// The faults of a mission, begun in time: those of devices on the fault line, those of the computer itself.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <deque>
 #include <optional>
@@ -21,11 +22,17 @@ class MissionFaults {
       : config_(config), begun_(config.faults.size(), false) {}
 
   [[nodiscard]] bool empty() const noexcept { return begun_.empty(); }
+  /// How many have begun.
+  [[nodiscard]] std::size_t begun() const noexcept {
+    return static_cast<std::size_t>(std::count(begun_.begin(), begun_.end(), true));
+  }
   /// For what can fail.
   [[nodiscard]] const sitl::FaultLine& line() const noexcept { return line_; }
   /// The cameras behind their faults; themselves in a mission without faults. Once for each of their readers.
   [[nodiscard]] std::vector<firmware_if::DepthCamera*> connect(
       std::span<firmware_if::DepthCamera* const> cameras);
+  /// Since when time counts that counts from no phase; none: it does not yet. Without a call: from 0.
+  void count_from(std::optional<MonotonicTime> start) noexcept { start_ = start; }
   /// Begins those that are due at `now`, and ends those that are over. True if the first one of all began.
   bool advance(MonotonicTime now, governor::Phase phase);
   /// What wind, map and computer are to do about it.
@@ -38,6 +45,7 @@ class MissionFaults {
   sitl::FaultLine line_;
   std::vector<bool> begun_;  ///< By config_.faults.
   bool any_{false};
+  std::optional<MonotonicTime> start_{MonotonicTime{}};
   std::array<std::optional<MonotonicTime>, governor::kPhaseCount> phase_begin_{};
   std::deque<sitl::FaultyDepthCamera> camera_;
 };

@@ -107,6 +107,7 @@ void ScenarioReader::read_head(Scenario& s) const {
         vehicle::ships(name) ? name : (std::filesystem::path(path_).parent_path() / name).string();
     const vehicle::Vehicle vehicle = vehicle::load_vehicle(from);
     set_vehicle(s.config, vehicle);
+    s.vehicle = from;
     s.files.insert(s.files.end(), vehicle.patterns.begin(), vehicle.patterns.end());
     s.files.push_back(from);
   }

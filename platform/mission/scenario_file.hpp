@@ -34,6 +34,7 @@ struct Scenario {
   std::string about;  ///< One line.
   std::string world;  ///< Path of a world file, or empty: `environment`.
   std::string environment;
+  std::string vehicle{"paper"};    ///< Shipped, or the path of its file.
   std::vector<sitl::Body> bodies;  ///< Besides those of the world.
   MissionConfig config{};
   Expectation expect{};

@@ -43,8 +43,5 @@ inline constexpr double kMostPlaces =
 
 /// Seconds for 300 x 100 x 10 m. Throws InputError for a radius or resolution out of range.
 [[nodiscard]] WayVerdict judge_way(const World& world, const WayQuestion& question);
-/// An SVG picture: cuts at the heights of start and goal with what is solid, what is too narrow, and the ways.
-[[nodiscard]] std::string way_svg(const World& world, double radius_m, const WayVerdict& verdict,
-                                  const std::string& title);
 
 }  // namespace roborun::sitl

@@ -6,6 +6,9 @@
 #include <limits>
 #include <vector>
 
+#include "core/geometry/math.hpp"
+#include "platform/live/guard.hpp"
+
 namespace roborun::live {
 namespace {
 
@@ -104,6 +107,33 @@ TEST_F(ObstacleSectorsTest, TheGroundBelowALeaningVehicleIsNoObstacle) {
   EXPECT_LT(at(0), 600) << "in the body's axes the ground is ahead";
   show(false, R_LB);
   EXPECT_EQ(at(0), kFree);
+}
+
+TEST_F(ObstacleSectorsTest, IsClearAsFarAsTheNearestInTheDirectionAndNotAtAllWhereManyAreUnknown) {
+  depth_m[kHeight / 2 * kWidth + kWidth / 2] = 6.0F;  // straight ahead, a wire
+  show(false);
+  const auto clear_m = [&](double clockwise_deg, double half_deg) {
+    return ObstacleSectors::clear_m(sut.message(MonotonicTime{Nanos{1'000'000'000}}),
+                                    clockwise_deg * core::kDegree, half_deg * core::kDegree);
+  };
+  EXPECT_NEAR(clear_m(0.0, 30.0), 6.0, 0.05);
+  EXPECT_NEAR(clear_m(20.0, 10.0), 25.01, 0.02) << "beside it: the range";
+  EXPECT_NEAR(clear_m(-340.0, 10.0), 25.01, 0.02) << "angles wrap";
+  EXPECT_EQ(clear_m(90.0, 30.0), 0.0) << "nobody looks there";
+  EXPECT_EQ(clear_m(0.0, 180.0), 0.0);
+}
+
+TEST(GuardSpeedLimit, StopsWithinWhatIsClear) {
+  const GuardSpeedLimit sut{kSitlQuadrotorStopping, 0.6, 6.0};
+  for (const double clear_m : {3.0, 4.0, 6.0, 8.0}) {
+    const double v = sut.speed_mps(clear_m);
+    EXPECT_NEAR(0.6 + GuardSpeedLimit::kLatency_s * v + kSitlQuadrotorStopping.distance_m(v), clear_m, 1e-9);
+  }
+  EXPECT_EQ(sut.speed_mps(25.0), 6.0) << "the vehicle's own";
+  for (const double clear_m : {0.0, 0.5, 1.0})
+    EXPECT_EQ(sut.speed_mps(clear_m), GuardSpeedLimit::kLeast_mps) << clear_m;
+  const GuardSpeedLimit linear{{0.0, 0.5, 0.0}, 0.0, 100.0};
+  EXPECT_NEAR(linear.speed_mps(10.0), 10.0, 1e-9);
 }
 
 }  // namespace

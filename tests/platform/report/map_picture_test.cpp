@@ -29,8 +29,8 @@ TEST(MapPicture, RunsOfEqualCellsAreOneRectangleAndUnknownIsTheGround) {
   const std::array<MapPanel, 1> panels{panel()};
   const std::string svg = map_svg("map & file", panels);
   EXPECT_TRUE(test::well_formed(svg)) << svg;
-  EXPECT_EQ(test::count(svg, "class='o'/>"), 1U + 1U) << "one run, one in the legend";
-  EXPECT_EQ(test::count(svg, "class='f'/>"), 2U + 1U);
+  EXPECT_EQ(test::count(svg, R"(fill="#222"/>)"), 1U + 1U) << "one run, one in the legend";
+  EXPECT_EQ(test::count(svg, R"(fill="#cfe8ff"/>)"), 2U + 1U);
   EXPECT_NE(svg.find("-1.0 .. 1.0 x [m]"), std::string::npos);
   EXPECT_NE(svg.find("2.0 .. 3.0 z [m]"), std::string::npos);
 }
@@ -43,8 +43,8 @@ TEST(MapPicture, TheLowestRowIsAtTheBottom) {
   std::swap(p.cell[0], p.cell[4]);
   const std::string high = map_svg("t", {&p, 1});
   const auto y_px = [](const std::string& svg) {
-    const std::size_t end = svg.rfind("class='o'/>"), at = svg.rfind("y='", end) + 3;
-    return std::stod(svg.substr(at, svg.find('\'', at) - at));
+    const std::size_t end = svg.rfind(R"(fill="#222"/>)"), at = svg.rfind(R"(y=")", end) + 3;
+    return std::stod(svg.substr(at, svg.find('"', at) - at));
   };
   EXPECT_GT(y_px(low), y_px(high)) << "y grows downwards in a picture";
 }

@@ -146,15 +146,6 @@ TEST(WayJudge, EveryWorldThatIsMadeHasAWayUnlessClosed) {
   }
 }
 
-TEST(WayJudge, DrawsWhatItFound) {
-  const WorldDescription d = make_world(WorldKind::kMaze, 4, {});
-  const World world{WorldDescription(d)};
-  const std::string svg = way_svg(world, 0.8, judged(d, 0.8), "a <maze>");
-  EXPECT_TRUE(svg.starts_with("<svg"));
-  EXPECT_NE(svg.find("a &lt;maze&gt;"), std::string::npos);
-  EXPECT_NE(svg.find("<polyline"), std::string::npos);
-}
-
 TEST(WayJudge, RefusesARadiusOrResolutionThatCannotBe) {
   EXPECT_THROW((void)judged(open_way(), 0.0), InputError);
   EXPECT_THROW((void)judged(open_way(), 5.0), InputError);
