@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "platform/app/earth_argument.hpp"
 #include "platform/app/exit_code.hpp"
@@ -33,6 +34,7 @@ struct PlantOptions {
   bool no_pictures{false};
   bool bus_sensors{false};
   std::string can;
+  std::vector<std::string> kill_pulls;
   bool json{false};
 };
 
@@ -176,7 +178,9 @@ int plant(const PlantOptions& options) {
   if (options.bus_sensors || !options.can.empty()) {
     if (config.autopilot || config.physics)
       throw InputError("--bus-sensors, --can: go without --autopilot and --physics");
-    config.on_bus = {options.can};
+    config.on_bus = {options.can, options.kill_pulls};
+  } else if (!options.kill_pulls.empty()) {
+    throw InputError("--kill-pulls: goes with --can or --bus-sensors");
   }
   if (options.seconds > 0.0) config.seconds = options.seconds;
   const PlantScene scene = plant_scene(options.common);
@@ -262,6 +266,14 @@ void add_plant_command(CLI::App& app, std::function<int()>& run) {
   command->add_option(
       "--can", options->can,
       "That bus is this interface of the kernel: for roborun run --link dronecan:INTERFACE on the other end");
+  command
+      ->add_option(
+          "--kill-pulls", options->kill_pulls,
+          "OPEN,CLOSED: the contacts of its kill switch are lines of the kernel's gpio-sim; the files that "
+          "pull them (/sys/devices/platform/gpio-sim.0/gpiochip1/sim_gpio0/pull): for roborun run "
+          "--kill-lines")
+      ->delimiter(',')
+      ->expected(2);
   command->add_flag("--no-pictures", options->no_pictures,
                     "Depth images and clouds are made by a process of their own: roborun feed plant");
   command->add_flag("--json", options->json, "One JSON object on standard output, nothing else");

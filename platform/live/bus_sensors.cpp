@@ -62,6 +62,15 @@ std::array<double, 6> variances_of(const auto& covariance) noexcept {
   return out;
 }
 
+bool is_ours(const auto&) noexcept { return true; }
+/// One that says that it looks elsewhere than down is another one's.
+bool is_ours(const dc::RangeMeasurement& m) noexcept {
+  constexpr int kDown = -8, kNearlyDown = -7;  // of pitch, in fifteenths of pi
+  const auto& beam = m.beam_orientation_in_body_frame;
+  const auto pitch = beam.fixed_axis_roll_pitch_yaw[1];
+  return !beam.orientation_defined || pitch == kDown || pitch == kNearlyDown;
+}
+
 }  // namespace
 
 BusSensors::BusSensors(firmware_if::CanBus& bus, const SensorRig& rig,
@@ -124,6 +133,7 @@ void BusSensors::hear_as(const dc::Transfer& transfer, Voice& voice) noexcept {
     (void)accept(voice, "is no message of its type", transfer.stamp);
     return;
   }
+  if (!is_ours(message)) return;
   voice.node = transfer.header.source_node_id;
   take(message, transfer.stamp);
 }
@@ -276,17 +286,12 @@ void BusSensors::take(const dc::MagneticFieldStrength2& m, MonotonicTime came) n
 
 void BusSensors::take(const dc::RangeMeasurement& m, MonotonicTime came) noexcept {
   constexpr std::uint8_t kUndefined = 0, kValid = 1, kTooClose = 2, kTooFar = 3;
-  constexpr int kDown = -8, kNearlyDown = -7;  // of pitch, in twelfths of pi
-  const auto& beam = m.beam_orientation_in_body_frame;
-  const auto pitch = beam.fixed_axis_roll_pitch_yaw[1];
   range_voice_.heard = came;
-  const bool looks_down = !beam.orientation_defined || pitch == kDown || pitch == kNearlyDown;
   const auto range_m = static_cast<double>(m.range);
   const bool measured = m.reading_type == kUndefined || m.reading_type == kValid;
-  const char* why = !looks_down                                               ? "is not of what is below"
-                    : measured && !(std::isfinite(range_m) && range_m >= 0.0) ? "is no distance"
-                    : m.reading_type > kTooFar                                ? "is of no known kind"
-                                                                              : nullptr;
+  const char* why = measured && !(std::isfinite(range_m) && range_m >= 0.0) ? "is no distance"
+                    : m.reading_type > kTooFar                              ? "is of no known kind"
+                                                                            : nullptr;
   if (!accept(range_voice_, why, came)) return;
   range_m_ = measured ? range_m : m.reading_type == kTooClose ? 0.0 : std::numeric_limits<double>::infinity();
 }

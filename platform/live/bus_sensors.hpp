@@ -116,7 +116,7 @@ class BusSensors {
 
   firmware_if::CanBus& bus_;
   bool has_gnss_, needs_heading_;
-  std::array<firmware_if::dronecan::Reassembler::Session, 16> sessions_{};
+  std::array<firmware_if::dronecan::Reassembler::Session, 32> sessions_{};
   firmware_if::dronecan::Reassembler reassembler_;
   firmware_if::dronecan::BusTime time_;
   std::optional<sensor_port::LocalFrame> frame_;

@@ -106,8 +106,8 @@ class Plant {
   rt::MonotonicClock clock_;
   sensor_port::VehiclePorts names_;
   // What may be refused, before any port is made.
-  std::unique_ptr<can::SocketCan> kernel_;  ///< Null: the bus is made of ports, or there is none.
-  std::unique_ptr<PhysicsLink> physics_;    ///< Null: this machine's clock steps the world.
+  KernelEnds kernel_;                     ///< Null: the bus is made of ports, or there is none.
+  std::unique_ptr<PhysicsLink> physics_;  ///< Null: this machine's clock steps the world.
   PictureThread pictures_;
   TruthPort truth_;
   PlantFaults faults_;
@@ -131,7 +131,7 @@ Plant::Plant(const sitl::World& world, const PlantConfig& config)
       config_(config),
       flight_(mission::flight_config_of(world, config.mission)),
       names_(config.port),
-      kernel_(kernel_bus(config.on_bus)),
+      kernel_(kernel_ends(config.on_bus)),
       physics_(config.physics ? physics_link(*config.physics, config.origin) : nullptr),
       pictures_(world, config),
       truth_(names_),

@@ -12,34 +12,31 @@
 #include "platform/sensor_port/port_bus.hpp"
 #include "platform/sitl/autopilot/fake_autopilot.hpp"
 #include "platform/sitl/bus/fake_hardpoint.hpp"
-#include "platform/sitl/bus/fake_light.hpp"
 
 namespace roborun::live {
 namespace {
 
-constexpr std::uint8_t kHookNode = 34, kLightNode = 35;
+constexpr std::uint8_t kHookNode = 34;
 
 /// Sensors, bus and lines as another process sees them.
 class PortSide final : public PlantSide {
  public:
   PortSide(sitl::SimulatedPlant& plant, const SensorRig& rig, const sensor_port::VehiclePorts& names,
-           const sensor_port::EarthPlace& origin, const std::optional<PlantBus>& on_bus,
-           std::unique_ptr<can::SocketCan> kernel)
+           const sensor_port::EarthPlace& origin, const std::optional<PlantBus>& on_bus, KernelEnds kernel)
       : plant_(plant),
         bus_out_(names.bus_out()),
         navigation_(rig, names, origin, on_bus.has_value()),
         kernel_(std::move(kernel)),
-        hook_({.node_id = kHookNode}, plant.far_side().spare_bus(1)),
-        light_(kLightNode, 0, plant.far_side().spare_bus(2)) {
+        hook_({.node_id = kHookNode}, plant.far_side().spare_bus(1)) {
     if (on_bus) nodes_.emplace(plant.far_side().spare_bus(), origin, rig.gnss);
-    if (kernel_) return;
+    if (kernel_.bus) return;
     const std::string wrong = bus_.speak(names.bus_in(), {});
     if (!wrong.empty()) throw InputError(fmt::format("{}: {}", names.bus_in(), wrong));
   }
 
   /// The runtime makes the port on which it speaks.
   void listen() override {
-    if (kernel_) return;
+    if (kernel_.bus) return;
     if (!listens_ || bus_.reader().is_replaced()) listens_ = bus_.listen(bus_out_, {}).empty();
   }
 
@@ -63,7 +60,6 @@ class PortSide final : public PlantSide {
     sitl::FaultySensors& sensors = plant_.sensors();
     if (nodes_) nodes_->step(plant_.now(), clock_now - plant_.now(), plant_.vehicle());
     hook_.step(plant_.now());
-    light_.step(plant_.now());
     if (!package_ && !hook_.holds_package())
       package_ = {plant_.vehicle().state().p_WB.z() - plant_.vehicle().ground_m(),
                   plant_.vehicle().state().v_WB.norm()};
@@ -99,6 +95,11 @@ class PortSide final : public PlantSide {
     if (operator_.presses_kill())
       active = (active | ROBORUN_PORT_KILL_OPEN) & ~std::uint32_t{ROBORUN_PORT_KILL_CLOSED};
     if (operator_.arms()) active |= ROBORUN_PORT_ARM;
+    const auto pull = [&](const std::unique_ptr<SimLine>& line, std::uint32_t bit) {
+      if (line && !line->pull((active & bit) != 0)) ++pulls_refused_;
+    };
+    pull(kernel_.kill_open, ROBORUN_PORT_KILL_OPEN);
+    pull(kernel_.kill_closed, ROBORUN_PORT_KILL_CLOSED);
     navigation_.write_lines(plant_.now(), active, gone, shift);
   }
   void left_ground(MonotonicTime clock_now) override {
@@ -109,13 +110,14 @@ class PortSide final : public PlantSide {
   [[nodiscard]] std::uint64_t commands() const override { return commands_; }
   [[nodiscard]] std::optional<PlantPackage> package() const override { return package_; }
   [[nodiscard]] std::uint64_t lost() const override {
-    if (kernel_) return kernel_->counters().lost_on_receive + kernel_->counters().refused;
-    return bus_.reader().counters().dropped;
+    if (kernel_.bus)
+      return kernel_.bus->counters().lost_on_receive + kernel_.bus->counters().refused + pulls_refused_;
+    return bus_.reader().counters().dropped + pulls_refused_;
   }
 
  private:
   [[nodiscard]] firmware_if::CanBus& wire() noexcept {
-    if (kernel_) return *kernel_;
+    if (kernel_.bus) return *kernel_.bus;
     return bus_;
   }
 
@@ -123,12 +125,12 @@ class PortSide final : public PlantSide {
   std::string bus_out_;
   NavigationPorts navigation_;
   sensor_port::PortCan bus_;
-  std::unique_ptr<can::SocketCan> kernel_;  ///< Instead of bus_; may be null.
-  std::optional<SensorNodes> nodes_;        ///< None: the sensors are ports.
+  KernelEnds kernel_;                 ///< Its bus, if there is one, is instead of bus_.
+  std::optional<SensorNodes> nodes_;  ///< None: the sensors are ports.
   PlantOperator operator_;
   sitl::FakeHardpoint hook_;
-  sitl::FakeLight light_;
   std::optional<PlantPackage> package_;
+  std::uint64_t pulls_refused_{0};
   Nanos shift_{0};
   bool listens_{false};
   std::uint64_t commands_{0};
@@ -210,19 +212,25 @@ class AutopilotSide final : public PlantSide {
 
 }  // namespace
 
-std::unique_ptr<can::SocketCan> kernel_bus(const std::optional<PlantBus>& on_bus) {
-  if (!on_bus || on_bus->interface.empty()) return nullptr;
-  auto kernel = std::make_unique<can::SocketCan>();
-  if (const std::string wrong = kernel->open(on_bus->interface); !wrong.empty())
-    throw InputError("--can: " + wrong);
-  return kernel;
+KernelEnds kernel_ends(const std::optional<PlantBus>& on_bus) {
+  KernelEnds ends;
+  if (!on_bus) return ends;
+  if (!on_bus->interface.empty()) {
+    ends.bus = std::make_unique<can::SocketCan>();
+    if (const std::string wrong = ends.bus->open(on_bus->interface); !wrong.empty())
+      throw InputError("--can: " + wrong);
+  }
+  if (!on_bus->kill_pulls.empty()) {
+    ends.kill_open = std::make_unique<SimLine>("--kill-pulls", on_bus->kill_pulls.at(0));
+    ends.kill_closed = std::make_unique<SimLine>("--kill-pulls", on_bus->kill_pulls.at(1));
+  }
+  return ends;
 }
 
 std::unique_ptr<PlantSide> port_side(sitl::SimulatedAircraft& body, const SensorRig& rig,
                                      const sensor_port::VehiclePorts& names,
                                      const sensor_port::EarthPlace& origin,
-                                     const std::optional<PlantBus>& on_bus,
-                                     std::unique_ptr<can::SocketCan> kernel) {
+                                     const std::optional<PlantBus>& on_bus, KernelEnds kernel) {
   return std::make_unique<PortSide>(body.plant(), rig, names, origin, on_bus, std::move(kernel));
 }
 

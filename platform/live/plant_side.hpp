@@ -5,9 +5,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/sensor_rig.hpp"
 #include "platform/can/socket_can.hpp"
+#include "platform/live/sim_line.hpp"
 #include "platform/mavlink/link.hpp"
 #include "platform/mavlink/signed_end.hpp"
 #include "platform/mission/autopilot_choice.hpp"
@@ -60,16 +62,22 @@ class PlantSide {
 /// IMU, receiver and barometer are nodes on the bus, and an operator proves the kill switch and arms.
 struct PlantBus {
   std::string interface;  ///< Of the kernel; empty: the bus is made of ports.
+  /// The pulls of two gpio-sim lines, the kill switch's normally open and normally closed contact; empty: the port of lines has them.
+  std::vector<std::string> kill_pulls;
 };
 
-/// The interface of the kernel that `on_bus` names; null: none. Before any port is made: what is refused leaves none. Throws InputError.
-[[nodiscard]] std::unique_ptr<can::SocketCan> kernel_bus(const std::optional<PlantBus>& on_bus);
-/// Ports of `names`; the world's origin is at `origin`. `kernel`: of kernel_bus(). `body` outlives it. Throws InputError.
+/// What `on_bus` names of the kernel; null: nothing.
+struct KernelEnds {
+  std::unique_ptr<can::SocketCan> bus;
+  std::unique_ptr<SimLine> kill_open, kill_closed;
+};
+/// Before any port is made: what is refused leaves none. Throws InputError.
+[[nodiscard]] KernelEnds kernel_ends(const std::optional<PlantBus>& on_bus);
+/// Ports of `names`; the world's origin is at `origin`. `body` outlives it. Throws InputError.
 [[nodiscard]] std::unique_ptr<PlantSide> port_side(sitl::SimulatedAircraft& body, const SensorRig& rig,
                                                    const sensor_port::VehiclePorts& names,
                                                    const sensor_port::EarthPlace& origin,
-                                                   const std::optional<PlantBus>& on_bus,
-                                                   std::unique_ptr<can::SocketCan> kernel);
+                                                   const std::optional<PlantBus>& on_bus, KernelEnds kernel);
 /// A fake autopilot, which steps `body`'s motors.
 [[nodiscard]] std::unique_ptr<PlantSide> autopilot_side(sitl::SimulatedAircraft& body,
                                                         const VehicleModel& vehicle, Nanos minor_frame,

@@ -294,6 +294,7 @@ TEST_F(BusSensorsTest, ARangeFinderThatLooksDownSaysTheHeight) {
     return sut.height_m(nodes.now);
   };
   EXPECT_EQ(sut.height_m(nodes.now), std::nullopt) << "there is none";
+  EXPECT_EQ(with(1, 2.0F, 0), std::nullopt) << "it looks ahead";
   EXPECT_EQ(lacks("range"), "not in the list") << "it need not have one";
   EXPECT_TRUE(std::isnan(*with(1, 2.0F))) << "how it leans is not known";
   sut.set_up(Vector3(0.0, 0.6, 0.8));
@@ -304,12 +305,12 @@ TEST_F(BusSensorsTest, ARangeFinderThatLooksDownSaysTheHeight) {
   EXPECT_EQ(*with(2, 0.0F), 0.0);
   EXPECT_EQ(lacks("range"), "");
   EXPECT_EQ(*with(3, 0.0F), test::kInfinity);
-  for (const auto& bad : {with(1, kNanF), with(1, -1.0F), with(4, 1.0F), with(1, 1.0F, 0)})
-    EXPECT_TRUE(std::isnan(*bad));
-  EXPECT_EQ(lacks("range"), "node 40: what it says of range_sensor.Measurement is not of what is below");
+  for (const auto& bad : {with(1, kNanF), with(1, -1.0F), with(4, 1.0F)}) EXPECT_TRUE(std::isnan(*bad));
+  EXPECT_EQ(lacks("range"), "node 40: what it says of range_sensor.Measurement is of no known kind");
   EXPECT_TRUE(std::isfinite(*with(1, 5.0F)));
   EXPECT_EQ(lacks("range"), "node 40: measures 5.0 m on the ground: it must look down");
   EXPECT_TRUE(std::isnan(*sut.height_m(nodes.now + milliseconds{501})));
+  EXPECT_NEAR(*with(1, 7.0F, 0), 4.75, 1e-3) << "one that looks ahead changes nothing";
 }
 
 TEST_F(BusSensorsTest, StampsAreTheMessagesOwnOnceTheBusHasATime) {

@@ -28,8 +28,9 @@ flown() {  # SECONDS
     [[ -e /dev/shm/roborun-$name-bus-out ]] && break
     sleep 0.1
   done
-  sleep "$1"
+  sleep "${moment:-$1}"
 }
+moment=
 
 reaches_the_goal() {
   start
@@ -164,9 +165,21 @@ switches_off_without_the_other_machine() {
     is collision plant reason && unbridge
 }
 
+# One process is killed, 20 times, each time in the air at another moment.
+at_random_moments() {  # FLIGHT
+  local moments moment
+  mapfile -t moments < <(awk 'BEGIN { srand(8); for (i = 0; i < 20; ++i) printf "%.2f\n", 5 + 17 * rand() }')
+  for moment in "${moments[@]}"; do
+    tries "$1 at $moment s" "$1" || return 1
+  done
+}
+runtimes_killed() { at_random_moments falls_without_a_runtime; }
+plants_killed() { at_random_moments switches_off_without_a_plant; }
+feeders_killed() { at_random_moments lands_without_a_feeder; }
+
 [[ $# -gt 0 ]] || set -- reaches_the_goal flies_over_the_bus switches_off_without_a_bus lands_on_a_signal switches_off_without_a_plant \
   switches_off_when_the_plant_stops falls_without_a_runtime plant_ends_on_a_signal goes_on_with_a_new_feeder lands_without_a_feeder \
-  reaches_the_goal_from_another_machine switches_off_without_the_other_machine
+  reaches_the_goal_from_another_machine switches_off_without_the_other_machine runtimes_killed plants_killed feeders_killed
 failed=0
 for flight in "$@"; do
   tries $flight $flight || failed=$((failed + 1))
