@@ -1,3 +1,4 @@
+// Where the library is libgpiod 1.6; gpiod_line_v2.cpp is for version 2.
 #include "platform/gpio/gpiod_line.hpp"
 
 #include <fcntl.h>
@@ -5,8 +6,9 @@
 #include <gpiod.h>
 
 #include <cerrno>
-#include <charconv>
 #include <cstring>
+
+#include "platform/gpio/line_name.hpp"
 
 namespace roborun::gpio {
 
@@ -35,29 +37,23 @@ void release(LineHandle*& handle) noexcept {
 
 /// The line, not yet requested; null and `why` if there is none.
 LineHandle* find(const std::string& name, std::string& why) {
-  const std::size_t colon = name.find(':');
-  if (colon == std::string::npos) {
+  LineName wanted;
+  if (!parse(name, wanted, why)) return nullptr;
+  if (wanted.chip.empty()) {
     gpiod_line* line = gpiod_line_find(name.c_str());
     if (line != nullptr) return new LineHandle{gpiod_line_get_chip(line), line};
     why = fmt::format("line '{}': no chip has a line of this name (roborun gpio list)", name);
     return nullptr;
   }
-  unsigned offset = 0;
-  const char* const end = name.data() + name.size();
-  const auto parsed = std::from_chars(name.data() + colon + 1, end, offset);
-  if (parsed.ec != std::errc{} || parsed.ptr != end) {
-    why = fmt::format("line '{}': must be a name or CHIP:OFFSET", name);
-    return nullptr;
-  }
-  gpiod_chip* chip = gpiod_chip_open_lookup(name.substr(0, colon).c_str());
+  gpiod_chip* chip = gpiod_chip_open_lookup(wanted.chip.c_str());
   if (chip == nullptr) {
     why = fmt::format("line '{}': chip cannot be opened: {}", name, std::strerror(errno));
     return nullptr;
   }
-  gpiod_line* line = gpiod_chip_get_line(chip, offset);
+  gpiod_line* line = gpiod_chip_get_line(chip, wanted.offset);
   if (line == nullptr) {
     gpiod_chip_close(chip);
-    why = fmt::format("line '{}': the chip has no line {}", name, offset);
+    why = fmt::format("line '{}': the chip has no line {}", name, wanted.offset);
     return nullptr;
   }
   return new LineHandle{chip, line};

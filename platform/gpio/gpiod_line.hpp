@@ -1,5 +1,4 @@
-/// Digital lines of the Linux kernel, through libgpiod 1.6. Only gpiod_line.cpp knows the library, so that
-/// version 2 needs another source file and nothing else.
+/// Digital lines of the Linux kernel, through libgpiod: gpiod_line.cpp for version 1.6, gpiod_line_v2.cpp for version 2.
 #pragma once
 
 #include <string>

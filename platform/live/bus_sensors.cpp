@@ -234,7 +234,7 @@ void BusSensors::take(const dc::GnssHeading& m, MonotonicTime came) noexcept {
 }
 
 void BusSensors::let_go() noexcept {
-  const bool has_two_antennas = heading_voice_.node != 0 && waits_since_ - heading_voice_.stamp < kAntennas;
+  const bool has_two_antennas = heading_voice_.taken > 0 && waits_since_ - heading_voice_.stamp < kAntennas;
   if (!std::isfinite(waiting_->heading_rad) && !has_two_antennas) {
     const auto apart = [&](const Bearing& b) {
       return std::max(b.stamp - waiting_->stamp, waiting_->stamp - b.stamp);
@@ -394,7 +394,7 @@ void BusSensors::look(MonotonicTime now, std::vector<Need>& needs) {
 
 void BusSensors::use(MonotonicTime now, std::vector<PortUse>& all) const {
   const auto add = [&](const Voice& voice, std::uint64_t overwritten) {
-    const bool silent = voice.node != 0 && now - voice.stamp > voice.patience;
+    const bool silent = voice.taken > 0 && now - voice.stamp > voice.patience;
     all.push_back(
         {voice.device, voice.taken, voice.refused + overwritten, voice.silences + (silent ? 1U : 0U)});
   };
