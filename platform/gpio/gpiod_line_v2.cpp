@@ -4,6 +4,7 @@
 #include <gpiod.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -16,7 +17,9 @@
 #include "platform/gpio/line_name.hpp"
 
 namespace roborun::gpio {
-namespace {
+
+/// Objects of the library, with what frees them.
+namespace owned {
 
 template <auto kFree>
 struct Freed {
@@ -31,18 +34,24 @@ using Wanted = std::unique_ptr<gpiod_request_config, Freed<gpiod_request_config_
 using Request = std::unique_ptr<gpiod_line_request, Freed<gpiod_line_request_release>>;
 using Edges = std::unique_ptr<gpiod_edge_event_buffer, Freed<gpiod_edge_event_buffer_free>>;
 
-constexpr const char* kConsumer = "roborun";
-
-}  // namespace
+}  // namespace owned
 
 struct LineHandle {
-  Chip chip;
+  owned::Chip chip;
   unsigned offset{};
-  Request request;
-  Edges edges;
+  owned::Request request;
+  owned::Edges edges;
+  std::array<firmware_if::GpioEdge, 16> waiting{};  ///< Read, and not handed out: from `at` to `count`.
+  std::size_t at{0}, count{0};
 };
 
 namespace {
+
+using owned::Chip, owned::ChipInfo, owned::Info, owned::Lines, owned::Settings, owned::Wanted;
+
+constexpr const char* kConsumer = "roborun";
+// The kernel loses the oldest of more edges than it holds, the contract the newest of more than 16: it holds as many as it may.
+constexpr std::size_t kHeldByKernel = 1024, kReadAtOnce = 64;
 
 void release(LineHandle*& handle) noexcept {
   delete handle;
@@ -111,6 +120,24 @@ LineHandle* find(const std::string& name, std::string& why) {
   return nullptr;
 }
 
+/// All that the kernel holds; the first 16 of it are kept. kNotReady: nothing.
+Status take_waiting(LineHandle& line) noexcept {
+  line.at = line.count = 0;
+  for (std::size_t i = 0; i < kHeldByKernel / kReadAtOnce; ++i) {
+    const int count = gpiod_line_request_read_edge_events(line.request.get(), line.edges.get(), kReadAtOnce);
+    if (count < 0 && errno != EAGAIN && errno != EINTR) return Status::kIo;
+    for (int k = 0; k < count && line.count < line.waiting.size(); ++k) {
+      gpiod_edge_event* event =
+          gpiod_edge_event_buffer_get_event(line.edges.get(), static_cast<unsigned long>(k));
+      line.waiting[line.count++] = {
+          MonotonicTime{Nanos{static_cast<std::int64_t>(gpiod_edge_event_get_timestamp_ns(event))}},
+          gpiod_edge_event_get_event_type(event) == GPIOD_EDGE_EVENT_RISING_EDGE};
+    }
+    if (count < static_cast<int>(kReadAtOnce)) break;
+  }
+  return line.count > 0 ? Status::kOk : Status::kNotReady;
+}
+
 /// Empty: it is ours.
 std::string request(LineHandle& line, const LineConfig& config, gpiod_line_settings& how) {
   gpiod_line_settings_set_active_low(&how, config.active_low);
@@ -123,6 +150,7 @@ std::string request(LineHandle& line, const LineConfig& config, gpiod_line_setti
   if (!lines || !wanted || gpiod_line_config_add_line_settings(lines.get(), &line.offset, 1, &how) != 0)
     return fmt::format("line '{}': {}", config.name, std::strerror(errno));
   gpiod_request_config_set_consumer(wanted.get(), kConsumer);
+  gpiod_request_config_set_event_buffer_size(wanted.get(), kHeldByKernel);
   line.request.reset(gpiod_chip_request_lines(line.chip.get(), wanted.get(), lines.get()));
   if (line.request) return {};
   const int error = errno;
@@ -157,7 +185,6 @@ std::vector<LineInfo> list_lines() {
 GpiodInput::~GpiodInput() { release(line_); }
 
 std::string GpiodInput::open(const LineConfig& config) {
-  constexpr std::size_t kAtOnce = 1;
   release(line_);
   std::string why;
   line_ = find(config.name, why);
@@ -167,7 +194,7 @@ std::string GpiodInput::open(const LineConfig& config) {
   (void)gpiod_line_settings_set_edge_detection(how.get(), GPIOD_LINE_EDGE_BOTH);
   why = request(*line_, config, *how);
   if (why.empty()) {
-    line_->edges.reset(gpiod_edge_event_buffer_new(kAtOnce));
+    line_->edges.reset(gpiod_edge_event_buffer_new(kReadAtOnce));
     edges_ = gpiod_line_request_get_fd(line_->request.get());
     if (!line_->edges ||
         fcntl(edges_, F_SETFL, O_NONBLOCK) != 0)  // NOLINT(cppcoreguidelines-pro-type-vararg): POSIX
@@ -186,12 +213,10 @@ Result<bool> GpiodInput::active() noexcept {
 
 Status GpiodInput::next_edge(firmware_if::GpioEdge& edge) noexcept {
   if (line_ == nullptr) return Status::kIo;
-  const int count = gpiod_line_request_read_edge_events(line_->request.get(), line_->edges.get(), 1);
-  if (count < 0) return errno == EAGAIN || errno == EINTR ? Status::kNotReady : Status::kIo;
-  if (count == 0) return Status::kNotReady;
-  gpiod_edge_event* event = gpiod_edge_event_buffer_get_event(line_->edges.get(), 0);
-  edge.stamp = MonotonicTime{Nanos{static_cast<std::int64_t>(gpiod_edge_event_get_timestamp_ns(event))}};
-  edge.active = gpiod_edge_event_get_event_type(event) == GPIOD_EDGE_EVENT_RISING_EDGE;
+  if (line_->at == line_->count) {
+    if (const Status status = take_waiting(*line_); status != Status::kOk) return status;
+  }
+  edge = line_->waiting[line_->at++];
   return Status::kOk;
 }
 

@@ -102,8 +102,8 @@ TEST(MapCommand, ViewDrawsThreePanels) {
   EXPECT_EQ(test::count(svg, "cut at"), 2U);
   // The cut through the floor: eight rows of one run, the one with the hole of three.
   const std::size_t cut = svg.find("cut at z"), next = svg.find("cut at y");
-  EXPECT_EQ(test::count(svg.substr(cut, next - cut), "class='o'"), 9U);
-  EXPECT_EQ(test::count(svg.substr(cut, next - cut), "class='f'"), 1U);
+  EXPECT_EQ(test::count(svg.substr(cut, next - cut), R"(fill="#222")"), 9U);
+  EXPECT_EQ(test::count(svg.substr(cut, next - cut), R"(fill="#cfe8ff")"), 1U);
 }
 
 TEST(MapCommand, RefusesWhatIsNoMap) {
