@@ -37,7 +37,7 @@ struct Consequences {
   double cheapest_mps{};
   EnergyPerMetre least, at_top;              ///< At cheapest_mps, and at limits.speed_mps.
   Vector3 assumed_half_m = Vector3::Zero();  ///< flight::assumed_free_half_m().
-  double gap_m{};                            ///< The narrowest that plans go through.
+  double gap_m{};                            ///< The narrowest that plans go through, slowly.
   double thin_m{};                           ///< As far away limits.thinnest_m is a pixel wide; 0: not known.
   std::size_t bytes{};                       ///< In a world of 100 x 100 x 10 m.
 };
@@ -67,7 +67,7 @@ Consequences consequences_of(const vehicle::Vehicle& vehicle) {
   c.cheapest_mps = cheapest_speed_mps(v);
   c.least = energy_per_metre(v, c.cheapest_mps);
   c.at_top = energy_per_metre(v, v.speed_mps);
-  c.gap_m = 2.0 * planned_radius_m(v);
+  c.gap_m = 2.0 * slow_radius_m(v);
   c.thin_m = v.thinnest_m * config.flight.pixels_per_tan;
   c.bytes = flight::FlightSystem::arena_bytes(config.flight) +
             board::backend_bytes(map_bounds_W(config.flight), images) + sizeof(flight::FlightSystem);
