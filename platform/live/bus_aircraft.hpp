@@ -62,10 +62,10 @@ class BusAircraft final : public FarEnd {
   void disarm() noexcept override { actuators_.disarm(); }
   void end_frame(MonotonicTime now) noexcept override {
     actuators_.step(now);
-    hook_and_light_.step(now, flown_, sensors_.height_m(now).value_or(flown_.height_m));
+    hook_and_light_.step(now, sensors_.height_m(now));
   }
   void is_flown(const flight::Flown& flown) noexcept override {
-    flown_ = flown;
+    hook_and_light_.is_flown(flown);
     if (flown.estimated) sensors_.set_up(flown.up_B);
   }
   void release_package() noexcept override { hook_and_light_.release(); }
@@ -90,7 +90,6 @@ class BusAircraft final : public FarEnd {
   BusSensors sensors_;
   flight::ActuatorSide actuators_;
   HookAndLight hook_and_light_;
-  flight::Flown flown_{};
   std::uint64_t frames_{0};  ///< Heard on the bus until heard_.
   MonotonicTime heard_ = MonotonicTime::min();
   bool was_safe_{false};  ///< The arming switch, once all else was there.

@@ -10,7 +10,7 @@ constexpr Nanos kFalls{1'000'000'000};  // clear of the hook
 
 }  // namespace
 
-void HookAndLight::step(MonotonicTime now, const flight::Flown& flown, double height_m) noexcept {
+void HookAndLight::step(MonotonicTime now, std::optional<double> height_m) noexcept {
   if (is_asked_.exchange(false, std::memory_order_relaxed)) {
     asked_until_ = now + kAsked;
     hangs_ = true;
@@ -18,9 +18,9 @@ void HookAndLight::step(MonotonicTime now, const flight::Flown& flown, double he
   const bool killed = motors_.kill_switch().killed();
   (void)hook_.step(now, {.wanted = now < asked_until_,
                          .killed = killed,
-                         .estimated = flown.estimated,
-                         .height_m = height_m,
-                         .speed_mps = flown.speed_mps});
+                         .estimated = flown_.estimated,
+                         .height_m = height_m.value_or(flown_.height_m),
+                         .speed_mps = flown_.speed_mps});
   const auto& hook = motors_.node().inbox().hardpoint;
   if (hangs_ && hook_.open() && hook.count > 0 && hook.message.status == 0) {
     hangs_ = false;
@@ -29,7 +29,7 @@ void HookAndLight::step(MonotonicTime now, const flight::Flown& flown, double he
   }
   using firmware_if::VehicleState;
   light_.step(now, !motors_.armed() || killed ? VehicleState::kSafe
-                   : flown.acts               ? VehicleState::kFailsafe
+                   : flown_.acts              ? VehicleState::kFailsafe
                                               : VehicleState::kArmed);
 }
 

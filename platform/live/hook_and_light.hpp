@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <optional>
 
 #include "firmware_if/package_release.hpp"
 #include "firmware_if/status_lights.hpp"
@@ -21,8 +22,11 @@ class HookAndLight {
 
   /// Any thread: the package is to go, as soon as it may, while a route waits for it.
   void release() noexcept { is_asked_.store(true, std::memory_order_relaxed); }
-  /// Once a minor frame, after the motors. `height_m`: above the ground; NaN: unknown.
-  void step(MonotonicTime now, const flight::Flown& flown, double height_m) noexcept;
+  /// The end of a minor frame, for the next step().
+  void is_flown(const flight::Flown& flown) noexcept { flown_ = flown; }
+  /// Once a minor frame, after the motors. `height_m`: above what is below, as measured; NaN: unknown. None: that over the
+  /// take-off counts.
+  void step(MonotonicTime now, std::optional<double> height_m) noexcept;
   /// On the ground, after step().
   void look(MonotonicTime now, std::vector<Need>& needs) const;
   /// Packages, as the hook has confirmed. Any thread.
@@ -33,6 +37,7 @@ class HookAndLight {
   bool needs_hook_;
   firmware_if::PackageRelease hook_;
   firmware_if::StatusLights light_;
+  flight::Flown flown_{};
   std::atomic<bool> is_asked_{false};
   MonotonicTime asked_until_ = MonotonicTime::min();
   bool hangs_{false};  ///< What was asked for, by what the hook says.

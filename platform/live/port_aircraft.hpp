@@ -57,9 +57,9 @@ class PortAircraft final : public FarEnd {
   void disarm() noexcept override { actuators_.disarm(); }
   void end_frame(MonotonicTime now) noexcept override {
     actuators_.step(now);
-    hook_and_light_.step(now, flown_, flown_.height_m);
+    hook_and_light_.step(now, std::nullopt);
   }
-  void is_flown(const flight::Flown& flown) noexcept override { flown_ = flown; }
+  void is_flown(const flight::Flown& flown) noexcept override { hook_and_light_.is_flown(flown); }
   void release_package() noexcept override { hook_and_light_.release(); }
   [[nodiscard]] std::uint64_t packages_released() const noexcept override {
     return hook_and_light_.released();
@@ -89,7 +89,6 @@ class PortAircraft final : public FarEnd {
   NoGnss no_gnss_;
   flight::ActuatorSide actuators_;
   HookAndLight hook_and_light_;
-  flight::Flown flown_{};
 };
 
 }  // namespace roborun::live

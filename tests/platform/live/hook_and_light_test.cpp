@@ -27,7 +27,8 @@ class HookAndLightTest : public ::testing::Test {
       light.step(now);
       if (flies) (void)motors.command(command);
       motors.step(now);
-      sut.step(now, flown, height_m);
+      sut.is_flown(flown);
+      sut.step(now, height_m);
     }
   }
   [[nodiscard]] std::string lacks() const {
@@ -38,7 +39,7 @@ class HookAndLightTest : public ::testing::Test {
 
   MonotonicTime now{Nanos{1'000'000'000}};
   flight::Flown flown{.estimated = true, .height_m = 1.5, .speed_mps = 0.2};
-  double height_m{1.5};
+  std::optional<double> height_m{1.5};
   bool flies{true}, has_hook{true};
   sitl::SimulatedActuators far_side_{1, {}};
   sitl::Vehicle body_{{}, {}, Vector3::Zero(), 1};
@@ -90,6 +91,17 @@ TEST_F(HookAndLightTest, KeepsThePackageWhereItWouldBreakOrNobodyKnows) {
   EXPECT_TRUE(hook.holds_package()) << "what was asked for is over";
   motors.terminate();
   keeps("terminated");
+}
+
+TEST_F(HookAndLightTest, WithoutAMeasurementTheHeightOverTheTakeOffCounts) {
+  height_m.reset();
+  flown.height_m = 2.1;
+  sut.release();
+  run(2.0);
+  EXPECT_TRUE(hook.holds_package());
+  flown.height_m = 1.9;
+  run(1.0);
+  EXPECT_FALSE(hook.holds_package());
 }
 
 TEST_F(HookAndLightTest, TheVehicleIsNotReadyWithoutAPackageOnItsHook) {
