@@ -52,7 +52,7 @@ std::uint32_t half_of(float centre, std::uint32_t pixels) noexcept {
 constexpr std::uint32_t kLeastPixels = 8, kMostPixels = 1280;
 
 /// The part of an image around its optical axis.
-struct Window {
+struct PixelWindow {
   std::uint32_t left{}, top{}, width{}, height{};
 };
 
@@ -71,7 +71,7 @@ bool is_size(const roborun_port_depth& d, std::size_t payload_bytes) noexcept {
          d.height <= kMostPixels && payload_bytes == pixel_bytes * d.width * d.height;
 }
 
-Window window_of(const roborun_port_depth& d) noexcept {
+PixelWindow window_of(const roborun_port_depth& d) noexcept {
   const std::uint32_t across = std::min(half_of(d.cx + 0.5F, d.width), d.width / 2);
   const std::uint32_t down = std::min(half_of(d.cy + 0.5F, d.height), d.height / 2);
   const auto from = [](float centre, std::uint32_t half, std::uint32_t pixels) {
@@ -81,21 +81,21 @@ Window window_of(const roborun_port_depth& d) noexcept {
   return {from(d.cx, across, d.width), from(d.cy, down, d.height), 2 * across, 2 * down};
 }
 
-/// 0 says nothing, whatever the pixels are made of.
-float depth_of(float raw_m) noexcept {
-  return raw_m > 0.0F ? raw_m : std::numeric_limits<float>::quiet_NaN();
-}
-
-void take_row(const roborun_port_depth& d, const std::byte* row, std::span<float> out_m) noexcept {
-  if (d.pixel == ROBORUN_PORT_FLOAT32_M) {
-    std::memcpy(out_m.data(), row, out_m.size_bytes());
-    for (float& depth_m : out_m) depth_m = depth_of(depth_m);
-    return;
-  }
-  for (std::size_t i = 0; i < out_m.size(); ++i) {
-    std::uint16_t raw = 0;
-    std::memcpy(&raw, row + 2 * i, sizeof raw);
-    out_m[i] = depth_of(static_cast<float>(raw) * d.unit_m);
+/// Metres out of pixels of an image of that width, row by row; 0 says nothing, whatever they are made of.
+template <typename Pixel>
+void take_pixels(std::span<const std::byte> image, std::uint32_t width, const PixelWindow& window,
+                 float unit_m, float* out_m) noexcept {
+  std::array<Pixel, kMostPixels + 2 * sizeof(std::uint64_t) / sizeof(Pixel)> row;
+  for (std::uint32_t v = 0; v < window.height; ++v, out_m += window.width) {
+    const std::size_t first = std::size_t{window.top + v} * width + window.left;
+    const std::size_t before = copy_shared(image, first * sizeof(Pixel), window.width * sizeof(Pixel),
+                                           std::as_writable_bytes(std::span(row)));
+    const Pixel* raw = row.data() + before / sizeof(Pixel);
+#pragma omp simd
+    for (std::uint32_t u = 0; u < window.width; ++u) {
+      const float depth_m = static_cast<float>(raw[u]) * unit_m;
+      out_m[u] = depth_m > 0.0F ? depth_m : std::numeric_limits<float>::quiet_NaN();
+    }
   }
 }
 
@@ -143,26 +143,32 @@ std::string PortDepthCamera::open(const std::string& path, const PortClock& cloc
 }
 
 Status PortDepthCamera::read(firmware_if::DepthFrame& frame) noexcept {
-  PortSample port;
-  if (const Status status = reader_.newest(port); status != Status::kOk) return status;
+  PortLoan loan;
   roborun_port_depth d;
-  const auto stamp = take(port, d);
+  PixelWindow window;
+  bool is_sized = false;
+  Status status = Status::kNotReady;
+  for (int i = 0; i < PortReader::kTries && status == Status::kNotReady; ++i) {
+    if (const Status lent = reader_.borrow(loan); lent != Status::kOk) return lent;
+    std::memcpy(&d, loan.port.sample.data(), sizeof d);
+    is_sized = is_size(d, loan.port.payload.size()) && std::size_t{d.width} * d.height <= depth_m_.size();
+    window = is_sized && is_optics(d) ? window_of(d) : PixelWindow{};
+    if (d.pixel == ROBORUN_PORT_FLOAT32_M)
+      take_pixels<float>(loan.port.payload, d.width, window, 1.0F, depth_m_.data());
+    else
+      take_pixels<std::uint16_t>(loan.port.payload, d.width, window, d.unit_m, depth_m_.data());
+    status = reader_.give_back(loan);
+  }
+  if (status != Status::kOk) return status;
+  const auto stamp = take(loan.port, d);
   if (!stamp) return Status::kNotReady;
-  if (!is_size(d, port.payload.size()) || std::size_t{d.width} * d.height > depth_m_.size()) {
+  if (!is_sized) {
     ++refusals_.size;
     return Status::kNotReady;
   }
-  const bool sees = is_optics(d);
-  const Window window = sees ? window_of(d) : Window{};
-  if (!sees || window.width < kLeastPixels || window.height < kLeastPixels || !has_mount(d.mount)) {
+  if (window.width < kLeastPixels || window.height < kLeastPixels || !has_mount(d.mount)) {
     ++refusals_.optics;
     return Status::kNotReady;
-  }
-  const std::size_t pixel_bytes = d.pixel == ROBORUN_PORT_FLOAT32_M ? 4 : 2;
-  for (std::uint32_t v = 0; v < window.height; ++v) {
-    const std::size_t first = std::size_t{window.top + v} * d.width + window.left;
-    take_row(d, port.payload.data() + pixel_bytes * first,
-             std::span(depth_m_).subspan(std::size_t{v} * window.width, window.width));
   }
   frame.stamp = *stamp;
   frame.sequence = d.at.sequence;

@@ -49,6 +49,17 @@ const char* kind_name(std::uint32_t kind) noexcept {
   }
 }
 
+std::size_t copy_shared(std::span<const std::byte> from, std::size_t first, std::size_t bytes,
+                        std::span<std::byte> to) noexcept {
+  const auto* words = static_cast<const std::uint64_t*>(static_cast<const void*>(from.data())) + first / 8;
+  const std::size_t before = first % 8, count = (before + bytes + 7) / 8;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint64_t word = load(words[i], __ATOMIC_RELAXED);
+    std::memcpy(&to[8 * i], &word, sizeof word);
+  }
+  return before;
+}
+
 std::string PortReader::check_layout() {
   if (memory_.size() < sizeof(roborun_port_header)) return "is no sensor port: shorter than its header";
   roborun_port_header h;  // what is checked is what is used
@@ -109,62 +120,88 @@ bool PortReader::look(std::uint64_t& written) noexcept {
   return written > next_;
 }
 
-bool PortReader::copy(std::uint64_t n, PortSample& out) noexcept {
-  const std::byte* at = memory_.data() + sizeof(roborun_port_header) + (n % slot_count_) * slot_bytes_;
-  const auto& slot = *static_cast<const roborun_port_slot*>(static_cast<const void*>(at));
+bool PortReader::lend(std::uint64_t n, PortLoan& loan) noexcept {
+  const roborun_port_slot& slot = slot_of(n);
   if (load(slot.guard, __ATOMIC_ACQUIRE) != 2 * n + 2) return false;
   const std::uint32_t bytes = load(slot.payload_bytes, __ATOMIC_RELAXED);
-  const std::uint32_t room = payload_room_bytes();
-  const std::uint32_t taken = bytes <= room ? bytes : 0;
-  const auto* word = static_cast<const std::uint64_t*>(static_cast<const void*>(at + sizeof slot));
-  const std::size_t words = (sample_bytes_ + taken + 7) / 8;
-  for (std::size_t i = 0; i < words; ++i) copy_[i] = load(word[i], __ATOMIC_RELAXED);
-  const std::int64_t offset_ns = load(header().clock_offset_ns, __ATOMIC_RELAXED);
-  // What was read above was read before the guard is looked at again.
-  std::atomic_thread_fence(std::memory_order_acquire);
-  if (load(slot.guard, __ATOMIC_RELAXED) != 2 * n + 2) return false;
-  const auto* whole = reinterpret_cast<const std::byte*>(copy_.data());
-  out = {{whole, sample_bytes_}, {whole + sample_bytes_, taken}, offset_ns};
-  if (bytes > room) {
-    ++counters_.refused;
-    out.payload = {};
-  }
+  const auto* sample = static_cast<const std::byte*>(static_cast<const void*>(&slot + 1));
+  loan.number = n;
+  loan.is_too_long = bytes > payload_room_bytes();
+  const auto copied = std::as_writable_bytes(std::span(copy_)).first(sample_bytes_);
+  copy_shared({sample, sample_bytes_}, 0, sample_bytes_, copied);
+  loan.port.sample = copied;
+  loan.port.payload = {sample + sample_bytes_, loan.is_too_long ? 0 : bytes};
+  loan.port.clock_offset_ns = load(header().clock_offset_ns, __ATOMIC_RELAXED);
   return true;
 }
 
-Status PortReader::newest(PortSample& out) noexcept {
+PortSample PortReader::copy(const PortLoan& loan) noexcept {
+  PortSample whole = loan.port;
+  const auto copied = std::as_writable_bytes(std::span(copy_)).subspan(sample_bytes_);
+  copy_shared(whole.payload, 0, whole.payload.size(), copied);
+  whole.payload = copied.first(whole.payload.size());
+  return whole;
+}
+
+bool PortReader::finish(const PortLoan& loan) noexcept {
+  // What was read of it was read before the guard is looked at again.
+  std::atomic_thread_fence(std::memory_order_acquire);
+  if (load(slot_of(loan.number).guard, __ATOMIC_RELAXED) != 2 * loan.number + 2) {
+    ++counters_.torn;
+    return false;
+  }
+  counters_.dropped += loan.number - next_;
+  counters_.refused += loan.is_too_long ? 1 : 0;
+  next_ = loan.number + 1;
+  ++counters_.read;
+  return true;
+}
+
+Status PortReader::borrow(PortLoan& loan) noexcept {
   if (memory_.data() == nullptr || memory_.is_cut()) return Status::kIo;
   for (int i = 0; i < kTries; ++i) {
     std::uint64_t written = 0;
-    if (!look(written)) return memory_.is_cut() ? Status::kIo : Status::kNotReady;
-    if (copy(written - 1, out)) {
-      counters_.dropped += written - 1 - next_;
-      next_ = written;
-      ++counters_.read;
-      return memory_.is_cut() ? Status::kIo : Status::kOk;
-    }
+    if (!look(written)) break;
+    if (lend(written - 1, loan)) return Status::kOk;
     ++counters_.torn;
   }
   return memory_.is_cut() ? Status::kIo : Status::kNotReady;
+}
+
+Status PortReader::give_back(const PortLoan& loan) noexcept {
+  const bool whole = finish(loan);
+  return memory_.is_cut() ? Status::kIo : whole ? Status::kOk : Status::kNotReady;
+}
+
+Status PortReader::newest(PortSample& out) noexcept {
+  Status status = Status::kNotReady;
+  for (int i = 0; i < kTries && status == Status::kNotReady; ++i) {
+    PortLoan loan;
+    if (const Status lent = borrow(loan); lent != Status::kOk) return lent;
+    out = copy(loan);
+    status = give_back(loan);
+  }
+  return status;
 }
 
 Status PortReader::next(PortSample& out) noexcept {
   if (memory_.data() == nullptr || memory_.is_cut()) return Status::kIo;
   for (int i = 0; i < kTries; ++i) {
     std::uint64_t written = 0;
-    if (!look(written)) return memory_.is_cut() ? Status::kIo : Status::kNotReady;
+    if (!look(written)) break;
     // The slot of the one before these is the next that is written.
     const std::uint64_t oldest = written >= slot_count_ ? written - slot_count_ + 1 : 0;
     if (next_ < oldest) {
       counters_.dropped += oldest - next_;
       next_ = oldest;
     }
-    if (copy(next_, out)) {
-      ++next_;
-      ++counters_.read;
-      return memory_.is_cut() ? Status::kIo : Status::kOk;
+    PortLoan loan;
+    if (!lend(next_, loan)) {
+      ++counters_.torn;
+      continue;
     }
-    ++counters_.torn;
+    out = copy(loan);
+    if (finish(loan)) return memory_.is_cut() ? Status::kIo : Status::kOk;
   }
   return memory_.is_cut() ? Status::kIo : Status::kNotReady;
 }

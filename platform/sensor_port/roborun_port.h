@@ -271,7 +271,7 @@ static inline const char* roborun_port_open(struct roborun_port_writer* w, const
     if (file >= 0) close(file); /* locked until here: no third writer came between */
     if (wrong != NULL) return wrong;
   }
-  void* memory = mmap(NULL, (size_t)w->bytes, PROT_READ | PROT_WRITE, MAP_SHARED, w->file, 0);
+  void* memory = mmap(NULL, (size_t)w->bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, w->file, 0);
   if (memory == MAP_FAILED) {
     const char* why = strerror(errno);
     roborun_port_close(w);
@@ -289,11 +289,15 @@ static inline const char* roborun_port_open(struct roborun_port_writer* w, const
 static inline void roborun_port_put(void* to, const void* from, size_t bytes) {
   uint64_t* out = (uint64_t*)to;
   const char* in = (const char*)from;
-  for (size_t done = 0; done < bytes; done += 8) {
-    uint64_t word = 0;
-    memcpy(&word, in + done, bytes - done < 8 ? bytes - done : 8);
+  uint64_t word = 0;
+  for (; bytes >= 8; bytes -= 8, in += 8) {
+    memcpy(&word, in, 8);
     __atomic_store_n(out++, word, __ATOMIC_RELAXED);
   }
+  if (bytes == 0) return;
+  word = 0;
+  memcpy(&word, in, bytes);
+  __atomic_store_n(out, word, __ATOMIC_RELAXED);
 }
 
 /* Writes one sample. Neither waits nor calls the system. 0: written; -1: larger than the port was made for. */

@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <thread>
 
+#include "tests/platform/sensor_port/one_mapping.hpp"
 #include "tests/support/limits.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 #include "tests/support/scratch.hpp"
@@ -107,6 +110,51 @@ TEST_F(PortDepthCameraTest, ReadsWholeNumbersByTheirUnit) {
   ASSERT_EQ(sut_.read(frame), Status::kOk);
   EXPECT_TRUE(std::isnan(frame.depth_m[0]));
   EXPECT_FLOAT_EQ(frame.depth_m[1], 2.5F);
+}
+
+TEST_F(PortDepthCameraTest, TakesRowsThatBeginAnywhere) {
+  constexpr std::uint32_t kWidth = 31, kHeight = 9, kLeft = 5;
+  start(ROBORUN_PORT_DEPTH, kWidth * kHeight * 2);
+  std::vector<std::uint16_t> raw(kWidth * kHeight);
+  for (std::size_t i = 0; i < raw.size(); ++i) raw[i] = static_cast<std::uint16_t>(1 + i);
+  roborun_port_depth d = image(kWidth, kHeight);
+  d.pixel = ROBORUN_PORT_UINT16;
+  d.unit_m = 1.0F;
+  d.cx = 17.5F;  // 13 columns to its right
+  d.cy = 3.5F;   // 4 rows above it
+  write(d, raw.data(), raw.size() * 2);
+  firmware_if::DepthFrame frame;
+  ASSERT_EQ(sut_.read(frame), Status::kOk);
+  ASSERT_EQ(frame.width, 26);
+  ASSERT_EQ(frame.height, 8);
+  for (std::uint32_t v = 0; v < frame.height; ++v)
+    for (std::uint32_t u = 0; u < frame.width; ++u)
+      ASSERT_EQ(frame.depth_m[v * frame.width + u], raw[v * kWidth + u + kLeft]) << u << ", " << v;
+}
+
+TEST_F(PortDepthCameraTest, TakesNoTornImage) {  // for ThreadSanitizer, too
+  constexpr std::uint32_t kSide = 64, kImages = 5000;
+  start(ROBORUN_PORT_DEPTH, kSide * kSide * 4);
+  write(image(kSide, kSide));
+  const OneMapping one(writer_, sut_.reader());
+  ASSERT_TRUE(one.is_one());
+  std::thread thread([this] {
+    std::vector<float> depth_m(kSide * kSide);
+    for (std::uint32_t n = 2; n <= kImages; ++n) {
+      std::fill(depth_m.begin(), depth_m.end(), static_cast<float>(n));
+      write(image(kSide, kSide), depth_m.data(), depth_m.size() * 4);
+    }
+  });
+  firmware_if::DepthFrame frame;
+  while (frame.sequence != kImages) {
+    if (sut_.read(frame) != Status::kOk) continue;
+    EXPECT_TRUE(std::all_of(frame.depth_m.begin(), frame.depth_m.end(),
+                            [&](float m) { return m == static_cast<float>(frame.sequence); }))
+        << "image " << frame.sequence;
+  }
+  thread.join();
+  const PortCounters& counters = sut_.reader().counters();
+  EXPECT_EQ(counters.read + counters.dropped, kImages);
 }
 
 TEST_F(PortDepthCameraTest, PutsTheOpticalAxisInTheMiddle) {

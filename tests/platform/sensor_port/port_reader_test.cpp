@@ -12,6 +12,7 @@
 #include <random>
 #include <thread>
 
+#include "tests/platform/sensor_port/one_mapping.hpp"
 #include "tests/support/no_alloc_scope.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -269,9 +270,12 @@ TEST_F(PortReaderTest, TakesNoTornSampleFromAWriterThatIsKilledStoppedAndStarted
 TEST_F(PortReaderTest, AgreesWithAWriterOfTheSameProcess) {  // for ThreadSanitizer
   open_writer(2);
   ASSERT_EQ(sut_.open(path_, ROBORUN_PORT_IMU), "");
+  write(0);
+  const OneMapping one(writer_, sut_);
+  ASSERT_TRUE(one.is_one());
   constexpr std::uint32_t kSamples = 50'000;
   std::thread thread([this] {
-    for (std::uint32_t n = 0; n < kSamples; ++n) {
+    for (std::uint32_t n = 1; n < kSamples; ++n) {
       const Numbered numbered(n);
       (void)roborun_port_write(&writer_, &numbered.sample, numbered.payload.data(), kPayload_bytes);
     }
