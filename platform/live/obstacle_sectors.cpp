@@ -43,7 +43,7 @@ void ObstacleSectors::see(std::size_t camera, const firmware_if::DepthFrame& f,
   c.stamp = f.stamp;
   c.range_min_m = static_cast<double>(f.range_min_m);
   c.range_m = static_cast<double>(f.range_m);
-  c.sector.fill({kNone_m, false, false});
+  c.sector.fill({kNone_m, 0, 0});
   const Matrix3 R_LC =
       R_LB * Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(mount.R_BC.data());
   const Vector3 p_LC = R_LB * Vector3(mount.p_BC_m[0], mount.p_BC_m[1], mount.p_BC_m[2]);
@@ -60,7 +60,7 @@ void ObstacleSectors::see(std::size_t camera, const firmware_if::DepthFrame& f,
       if (silent || empty) {
         if (std::fabs(ray_L.z()) > kLevel * core::hypot2(ray_L.x(), ray_L.y())) continue;
         Sector& sector = c.sector.at(sector_of(ray_L));
-        (silent ? sector.silent : sector.free) = true;
+        ++(silent ? sector.silent : sector.free);
         continue;
       }
       const Vector3 hit_L = p_LC + depth_m * ray_L;
@@ -71,13 +71,13 @@ void ObstacleSectors::see(std::size_t camera, const firmware_if::DepthFrame& f,
 }
 
 ObstacleSectors::Sector ObstacleSectors::merged(std::size_t index, MonotonicTime now) const {
-  Sector all{kNone_m, false, false};
+  Sector all{kNone_m, 0, 0};
   for (const Camera& camera : camera_) {
     if (camera.stamp == MonotonicTime::min() || now - camera.stamp > kOld) continue;
     const Sector& one = camera.sector.at(index);
     all.hit_m = std::min(all.hit_m, one.hit_m);
-    all.free = all.free || one.free;
-    all.silent = all.silent || one.silent;
+    all.free += one.free;
+    all.silent += one.silent;
   }
   return all;
 }
@@ -126,7 +126,7 @@ firmware_if::mavlink::ObstacleDistance ObstacleSectors::message(MonotonicTime no
         std::max(100.0 * static_cast<double>(sector.hit_m), static_cast<double>(m.min_distance));
     if (hit_cm <= m.max_distance)
       m.distances.at(i) = static_cast<std::uint16_t>(hit_cm);
-    else if (sector.free && !sector.silent)
+    else if (sector.free > sector.silent)
       m.distances.at(i) = static_cast<std::uint16_t>(m.max_distance + 1);
     else
       m.distances.at(i) = kUnknown;

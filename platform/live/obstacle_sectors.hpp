@@ -17,7 +17,7 @@ namespace roborun::live {
 
 /// 72 sectors of 5 degrees, clockwise; the middle of the first one is straight ahead. What lies within `band_m` above or below the
 /// body's middle counts. A sector holds the nearest
-/// hit; it is free only if a level ray (3 degrees) of it found nothing within the range and none of them said nothing; else
+/// hit; it is free only if more of its level rays (3 degrees) found nothing within the range than said nothing; else
 /// it is not known.
 class ObstacleSectors {
  public:
@@ -41,8 +41,8 @@ class ObstacleSectors {
 
  private:
   struct Sector {
-    float hit_m{};  ///< +infinity: none.
-    bool free{}, silent{};
+    float hit_m{};         ///< +infinity: none.
+    int free{}, silent{};  ///< Level rays.
   };
   struct Camera {
     MonotonicTime stamp = MonotonicTime::min();

@@ -59,8 +59,23 @@ TEST_F(ObstacleSectorsTest, NothingIsFreeAndSilenceIsNotKnown) {
   EXPECT_EQ(at(0, Nanos{600'000'000}), ObstacleSectors::kUnknown) << "an old image";
   depth_m[kHeight / 2 * kWidth + kWidth / 2] = std::numeric_limits<float>::quiet_NaN();
   show(false);
-  EXPECT_EQ(at(0), ObstacleSectors::kUnknown) << "one level ray said nothing";
-  EXPECT_EQ(at(30), kFree);
+  EXPECT_EQ(at(0), kFree) << "one level ray of many said nothing";
+  const auto silence = [this](std::size_t every) {  // one column of so many, from the middle on to the right
+    depth_m.assign(depth_m.size(), std::numeric_limits<float>::infinity());
+    for (std::size_t i = 0; i < depth_m.size(); ++i)
+      if (i % kWidth >= kWidth / 2 && i % every == 0) depth_m[i] = std::numeric_limits<float>::quiet_NaN();
+    show(false);
+  };
+  silence(3);
+  EXPECT_EQ(at(10), kFree) << "most found nothing";
+  silence(1);
+  EXPECT_EQ(at(10), ObstacleSectors::kUnknown);
+  EXPECT_EQ(at(350), kFree);
+  silence(2);
+  for (std::size_t i = 1; i < depth_m.size(); i += 4)
+    if (i % kWidth >= kWidth / 2) depth_m[i] = std::numeric_limits<float>::quiet_NaN();
+  show(false);
+  EXPECT_EQ(at(10), ObstacleSectors::kUnknown) << "most said nothing";
 }
 
 TEST_F(ObstacleSectorsTest, OnlyTheBandCounts) {
