@@ -244,6 +244,66 @@ TEST(Estimator, FollowsAnAutopilotsStateAndItsFrameGoesOnWhenTheAutopilotsJumps)
   EXPECT_EQ(state.stamp, at(1.48));
 }
 
+/// A vehicle that stands at (1, 2, 5) in the autopilot's frame.
+firmware_if::AutopilotState standing(double stamp_s, double yaw_rad = 0.0) {
+  firmware_if::AutopilotState sample;
+  sample.stamp = at(stamp_s);
+  sample.p_WB_m = {1.0, 2.0, 5.0};
+  sample.q_WB = {core::cos(0.5 * yaw_rad), 0.0, 0.0, core::sin(0.5 * yaw_rad)};
+  return sample;
+}
+
+TEST(Estimator, KeepsTheMapWhereAFollowedFrameJumpsSoonAndHardlyTurned) {
+  struct Case {
+    double after_s, turned_rad;
+    bool hold, keeps;
+  };
+  for (const Case& c :
+       {Case{0.01, 0.034, true, true}, Case{0.01, -0.034, true, true}, Case{0.01, 0.036, true, false},
+        Case{0.01, -0.036, true, false}, Case{0.2, 0.0, true, true}, Case{0.201, 0.0, true, false},
+        Case{0.01, 0.0, false, false}}) {
+    SCOPED_TRACE(c.after_s * 1000.0 + c.turned_rad);
+    Estimator sut({});
+    ASSERT_EQ(sut.follow(standing(1.0, 0.5), at(1.0), c.hold), Status::kOk);
+    firmware_if::AutopilotState sample = standing(1.0 + c.after_s, 0.5 + c.turned_rad);
+    sample.frame_number = 1;
+    sample.p_WB_m[0] = 4.0;
+    sample.w_WB_B_radps = {0.1, 0.2, 0.3};
+    ASSERT_EQ(sut.follow(sample, sample.stamp, c.hold), Status::kOk);
+    EstimatedState state;
+    ASSERT_EQ(sut.state(state), Status::kOk);
+    EXPECT_EQ(state.map_number, c.keeps ? 0U : 1U);
+    EXPECT_NEAR(state.p_WB.x(), c.hold ? 1.0 : 4.0, 1e-9);
+    EXPECT_EQ(state.w_WB_B, Vector3(0.1, 0.2, 0.3));
+    sample.stamp += Nanos{10'000'000};
+    ASSERT_EQ(sut.follow(sample, sample.stamp, c.hold), Status::kOk);
+    EXPECT_EQ(sut.counters().jumps, 1U) << "the same frame jumps once";
+  }
+}
+
+TEST(Estimator, FollowsNothingThatIsOldOrNoState) {
+  Estimator sut({});
+  ASSERT_EQ(sut.follow(standing(0.0), MonotonicTime{}, true), Status::kOk)
+      << "a first one may be at any time";
+  ASSERT_EQ(sut.follow(standing(0.1), at(0.3), true), Status::kOk) << "just young enough";
+  EXPECT_EQ(sut.follow(standing(0.2), at(0.4) + Nanos{1}, true), Status::kStale);
+  EXPECT_EQ(sut.counters().refused_stamp, 1U);
+  const auto refuses = [&](const auto& spoil) {
+    firmware_if::AutopilotState sample = standing(0.4);
+    spoil(sample);
+    EXPECT_EQ(sut.follow(sample, at(0.4), true), Status::kInvalidArgument);
+  };
+  refuses([](auto& s) { s.p_WB_m[2] = kNan; });
+  refuses([](auto& s) { s.v_WB_mps[1] = kNan; });
+  refuses([](auto& s) { s.w_WB_B_radps[0] = kNan; });
+  refuses([](auto& s) { s.q_WB[3] = kNan; });
+  refuses([](auto& s) { s.q_WB[0] = std::sqrt(1.021); });
+  EXPECT_EQ(sut.counters().refused_not_finite, 5U);
+  firmware_if::AutopilotState sample = standing(0.4);
+  sample.q_WB[0] = std::sqrt(1.019);
+  EXPECT_EQ(sut.follow(sample, at(0.4), true), Status::kOk);
+}
+
 TEST(Estimator, TheBarometerHoldsTheHeightWithoutGnss) {
   Estimator estimator({});
   Circle circle;
