@@ -106,7 +106,7 @@ class Flight {
     by_ = random(rng_.uniform(0.1, 9.0));
     if (fault_ == Fault::kClockSet) clock_ += Nanos{static_cast<std::int64_t>(by_.x() * 1e9)};
     if (fault_ == Fault::kOdometryBegins) ++reset_counter_;
-    if (fault_ == Fault::kOdometryBegins || fault_ == Fault::kOdometryJumps) {
+    if ((fault_ == Fault::kOdometryBegins && what_ > 0) || fault_ == Fault::kOdometryJumps) {
       p_WO_ += by_;
       q_WO_ = judge::times(judge::turned_by({0.0, 0.0, 0.1 * by_.x()}), q_WO_);
     }
@@ -137,7 +137,7 @@ class Flight {
       if (what_ > 1) force += (what_ < 4 ? 100.0 : 10.0) * by_;
       leap_after_ = false;
     }
-    if (fault_ == Fault::kFalls || (falls_ && k_ < 600)) force *= 0.02 * what_;
+    if (fault_ == Fault::kFalls || (falls_ && k_ < 600)) force *= 0.06 * what_;
     if (fault_ == Fault::kHuge) force *= 1e200 * by_.x();
     if (fault_ == Fault::kGarbage && by_.y() > 0.0) rate.y() = kNotKnown;
     if (fault_ == Fault::kGarbage && by_.y() < 0.0) force.x() = kNotKnown;
@@ -169,6 +169,7 @@ class Flight {
     fix.sigma_vertical_m = sigma_m_ * rng_.uniform(0.5, 1.5);
     fix.sigma_speed_mps = 0.05;
     fix.sigma_heading_rad = fault_ == Fault::kGarbage ? 0.0 : 0.02;
+    if (fault_ == Fault::kHeading && what_ < 2 && k_ % 120 == 0) fix.heading_rad = kNotKnown;
     if (fault_ == Fault::kGarbage) {
       const std::array garbled{&fix.sigma_horizontal_m, &fix.sigma_vertical_m, &fix.sigma_speed_mps,
                                &fix.v_WB_mps[1],        &fix.p_WB_m[2],        &fix.sigma_heading_rad};
