@@ -103,9 +103,8 @@ class Estimator {
       begin();
       return Status::kOk;
     }
-    const PastStates::Past* then = past_.at(fix.stamp);
-    if (then == nullptr || fix.stamp <= gnss_at_) return refuse(n.refused_stamp, Status::kStale);
-    gnss_at_ = fix.stamp;
+    const PastStates::Past* then = compared_with(fix.stamp, gnss_at_);
+    if (then == nullptr) return refuse(n.refused_stamp, Status::kStale);
     if (lost_) {
       begin_from(fix);
       return Status::kNotReady;
@@ -146,9 +145,8 @@ class Estimator {
   Status update(const firmware_if::BarometerSample& b) {
     if (!std::isfinite(b.altitude_m)) return refuse(n.refused_not_finite, Status::kInvalidArgument);
     if (!started_) return Status::kNotReady;
-    const PastStates::Past* then = past_.at(b.stamp);
-    if (then == nullptr || b.stamp <= barometer_at_) return refuse(n.refused_stamp, Status::kStale);
-    barometer_at_ = b.stamp;
+    const PastStates::Past* then = compared_with(b.stamp, barometer_at_);
+    if (then == nullptr) return refuse(n.refused_stamp, Status::kStale);
     if (!placed_) zero_m_ = b.altitude_m - then->p_WB.z();
     placed_ = true;
     const double dz = b.altitude_m - zero_m_ - then->p_WB.z();
@@ -180,9 +178,8 @@ class Estimator {
       begin();
       return Status::kNotReady;
     }
-    const PastStates::Past* then = past_.at(s.stamp);
-    if (then == nullptr || s.stamp <= odometry_at_) return refuse(n.refused_stamp, Status::kStale);
-    odometry_at_ = s.stamp;
+    const PastStates::Past* then = compared_with(s.stamp, odometry_at_);
+    if (then == nullptr) return refuse(n.refused_stamp, Status::kStale);
     if (lost_) {
       begin_from(s, o, *then);
       return Status::kNotReady;
@@ -256,6 +253,12 @@ class Estimator {
   bool is_recent(MonotonicTime t) const { return t <= x_.stamp && t + c_.oldest_fix >= x_.stamp; }
   bool follows(MonotonicTime t) const { return anchor_ && s_of(t - odometry_heard_) <= 0.5; }
 
+  /// Null: the sample is not newer than the `last` of its sensor, or nobody remembers its time.
+  const PastStates::Past* compared_with(MonotonicTime t, MonotonicTime& last) const {
+    const PastStates::Past* then = t > last ? past_.at(t) : nullptr;
+    if (then != nullptr) last = t;
+    return then;
+  }
   bool is_regular(MonotonicTime t) {
     if (t <= x_.stamp || s_of(t - x_.stamp) > 0.5) return false;
     odd_last_ = {};
