@@ -18,8 +18,7 @@ constexpr std::size_t kTrajectoryPoints = 32;
 constexpr double kCornerRoom_m = 0.25;
 constexpr double kAtGoal_m = 0.3;
 constexpr double kTooFast = 1.5;
-constexpr double kForgets = 0.9;      // what the planner took, from one decision to the next
-constexpr double kSlowEnough = 1.05;  // of the slow speed: what trajectories keep to
+constexpr double kForgets = 0.9;  // what the planner took, from one decision to the next
 /// So many pixels of a decision's images show something thin where poles or wires are: 40 to 900 in worlds of them. In environment
 /// 14 they are at most 3 (clean cameras), 23 (d455).
 constexpr std::uint32_t kThinPixels = 32;
@@ -287,22 +286,30 @@ void DecisionPipeline::fit(core::StageBudget& budget, double radius_m, double sp
   request.start_time = draft_.takes_over;
   request.radius_m = radius_m;
   meter_.charge_to(core::StageId::kSmoother);
-  stages::SmoothResult smoothed;
-  // Of the speed: in small steps first, for in the open a little less is enough, and what is too slow is made up for by the next
-  // plan, which is too fast again.
-  constexpr std::array<double, 7> kShares{1.0, 0.92, 0.85, 0.7, 0.6, 0.49, 0.34};
+  // Of the speed: in small steps first, for in the open a little less is enough, and last as slowly as any stop is free. The next
+  // plan tries a little more than what went.
+  constexpr std::array<double, 7> kShares{1.0, 0.95, 0.9, 0.85, 0.75, 0.55, 0.0};
+  constexpr double kMore = 1.15, kMore_mps = 0.2;
+  const double fastest_mps =
+      config_.stops_straight ? std::min(speed_mps, kMore * stopped_mps_ + kMore_mps) : speed_mps;
   for (const double share : kShares) {
-    request.limits = limits(share * speed_mps);
+    const double tried_mps = std::max(share * fastest_mps, std::min(kCrawl_mps, fastest_mps));
+    stages::SmoothResult smoothed;
+    request.limits = limits(tried_mps);
     RestOfBudget rest(budget, draft_.smoother_work);
-    const Status status = smoother_.smooth(request, permitted.view(), rest, smoothed);
+    out.smoother_status = smoother_.smooth(request, permitted.view(), rest, smoothed);
     draft_.smoother_work.units += smoothed.work.units;
-    if (share == 1.0 || status == Status::kOk) out.smoother_status = status;
-    if (status != Status::kOk) return;
+    if (out.smoother_status != Status::kOk) return;
     draft_.trajectory = smoothed.trajectory;
-    if (!config_.stops_straight ||
-        stops_free(draft_.trajectory, stages::FinestView(permitted.view()), draft_.smoother_work))
+    if (!config_.stops_straight) return;
+    if (stops_free(draft_.trajectory, draft_.takes_over, out, stages::FinestView(permitted.view()),
+                   draft_.smoother_work)) {
+      stopped_mps_ = tried_mps;
       return;
+    }
   }
+  stopped_mps_ = kCrawl_mps;
+  out.smoother_status = Status::kNoPath;
 }
 
 void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexcept {
@@ -370,6 +377,7 @@ void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noex
     if (!draft_.keeps) find_trajectory(in, budget, out);
     if (config_.turns) look_on(in, budget, out);
     give_way(in, budget, out);
+    slow_down(in, Known(*this, in).view(), budget, out);
     charge(core::StageId::kPlanner, draft_.planner_work, out);
     double& searched_s = searched_s_[static_cast<std::size_t>(out.decision.point.p1_level)];
     searched_s = std::max(seconds(out.cost[core::StageId::kPlanner]), kForgets * searched_s);
@@ -384,12 +392,6 @@ void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noex
   failures_ = out.smoother_status == Status::kOk || in.climbing ? 0 : failures_ + 1;
 }
 
-bool DecisionPipeline::may_squeeze() const noexcept {
-  const VehicleModel& vehicle = config_.vehicle;
-  return slow_radius_m(vehicle) < radius_m() &&
-         draft_.start.v_W.norm() <= kSlowEnough * vehicle.slow_speed_mps;
-}
-
 void DecisionPipeline::fit_narrow(core::StageBudget& budget, DecisionOutput& out) noexcept {
   const VehicleModel& vehicle = config_.vehicle;
   if (out.planner_status == Status::kStartBlocked) return leave(slow_radius_m(vehicle), budget, out);
@@ -402,6 +404,7 @@ void DecisionPipeline::find_trajectory(const DecisionInput& in, core::StageBudge
                                        DecisionOutput& out) noexcept {
   const double speed_mps = out.decision.point.speed_limit_mps;
   const bool may_be_narrow = may_squeeze(), was_narrow = draft_.is_narrow;
+  const bool may_narrow = may_be_narrow && !was_narrow;
   const auto is_found = [&out] { return out.smoother_status == Status::kOk; };
   // First with room for the smoother to cut corners, then as tight as the vehicle can fly: too tight for
   // extra room is no reason to flee. Where it is narrower still, slowly.
@@ -410,28 +413,32 @@ void DecisionPipeline::find_trajectory(const DecisionInput& in, core::StageBudge
   } else if (out.planner_status != Status::kStartBlocked) {
     fit(budget, radius_m(), speed_mps, out);
   }
-  if (is_found()) return;
+  if (is_found()) {
+    if (may_narrow) squeeze_on(in, budget, out);
+    return;
+  }
   search(in, radius_m(), out);
   if (out.planner_status != Status::kStartBlocked)
     fit(budget, radius_m(), speed_mps, out);
   else if (!may_be_narrow)
     leave(radius_m(), budget, out);
-  if (is_found() || was_narrow || !may_be_narrow) return;
+  if (!may_narrow) return;
+  if (is_found()) return squeeze_on(in, budget, out);
   search(in, slow_radius_m(config_.vehicle), out);
   fit_narrow(budget, out);
 }
 
-void DecisionPipeline::choose(const DecisionInput& in, DecisionOutput& out) noexcept {
-  // What is flown now is kept as long as it is free, arrives no later, and does not begin to brake before the next
-  // decision can replace it.
-  const bool is_free = std::isinf(draft_.committed_until_s);
-  const bool has_new = out.smoother_status == Status::kOk;
+bool DecisionPipeline::is_kept(const DecisionInput& in, const DecisionOutput& out) const noexcept {
   const MonotonicTime brakes = in.committed->start_time + from_seconds(in.committed->brake_begin_s);
-  const bool keeps = is_free && !draft_.replaces &&
-                     draft_.start.v_W.norm() < 1.1 * out.decision.point.speed_limit_mps &&
-                     draft_.takes_over + out.decision.point.deadline < brakes && has_new &&
-                     arrival_s(*in.committed, in) <= arrival_s(draft_.trajectory, in);
-  if (has_new && !keeps && !(is_free && draft_.keeps)) {
+  return !draft_.replaces && draft_.start.v_W.norm() < 1.1 * out.decision.point.speed_limit_mps &&
+         draft_.takes_over + out.decision.point.deadline < brakes &&
+         arrival_s(*in.committed, in) <= arrival_s(draft_.trajectory, in);
+}
+
+void DecisionPipeline::choose(const DecisionInput& in, DecisionOutput& out) noexcept {
+  const bool is_free = std::isinf(draft_.committed_until_s);
+  const bool keeps = is_free && draft_.stops && (draft_.keeps || is_kept(in, out));
+  if (out.smoother_status == Status::kOk && !keeps) {
     has_planned_ = true;
     is_narrow_ = draft_.is_narrow;
     if (draft_.leaves) {
@@ -443,9 +450,10 @@ void DecisionPipeline::choose(const DecisionInput& in, DecisionOutput& out) noex
     out.trajectory = draft_.trajectory;
     return;
   }
-  if (is_free || in.climbing) return;
+  if ((is_free && draft_.stops) || in.climbing) return;
   const Known known(*this, in);
-  const MonotonicTime free_until = in.committed->start_time + from_seconds(draft_.committed_until_s);
+  const MonotonicTime free_until =
+      is_free ? MonotonicTime::max() : in.committed->start_time + from_seconds(draft_.committed_until_s);
   const auto stop = stop_before(in, free_until, known.view(), draft_.smoother_work, out.latency);
   if (!stop) return;
   out.kind = DecisionKind::kBrake;

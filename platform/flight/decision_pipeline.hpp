@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 
@@ -144,6 +145,8 @@ class DecisionPipeline {
     bool dodges{};     ///< The trajectory goes aside, out of the way of a body.
     /// Nothing is better than what is flown: it comes to rest at the goal, goes aside already, or meets a body latest.
     bool keeps{};
+    bool
+        stops{};  ///< What is flown may be flown until the next decision can brake it: always true of motors of our own.
   };
 
   void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
@@ -176,15 +179,25 @@ class DecisionPipeline {
                  DecisionOutput& out) noexcept;
   /// The path of the last search as a trajectory.
   void fit(core::StageBudget& budget, double radius_m, double speed_mps, DecisionOutput& out) noexcept;
-  /// From everywhere on it the vehicle may stop straight on, as far as its stopping model says.
-  [[nodiscard]] bool stops_free(const Trajectory& trajectory, const stages::MapView& view,
-                                core::Work& work) const noexcept;
+  /// From everywhere on it the vehicle may stop straight on, as far as its stopping model says: from `from` on until the decision
+  /// after this one can brake, and while it brakes.
+  [[nodiscard]] bool stops_free(const Trajectory& trajectory, MonotonicTime from, const DecisionOutput& out,
+                                const stages::MapView& view, core::Work& work) const noexcept;
+  /// The same of this part of it.
+  [[nodiscard]] bool stops_free(const Trajectory& trajectory, MonotonicTime from, MonotonicTime until,
+                                const stages::MapView& view, core::Work& work) const noexcept;
+  /// Where what is flown would be kept, but stops too far (stops_free()): the same way, slower.
+  void slow_down(const DecisionInput& in, const stages::MapView& known, core::StageBudget& budget,
+                 DecisionOutput& out) noexcept;
   /// Slow enough for the room of slow flight, if that is less.
   [[nodiscard]] bool may_squeeze() const noexcept;
   /// The path of the last search, slowly and with the room that this takes.
   void fit_narrow(core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// From the search of plan() on, with less and less room.
   void find_trajectory(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
+  /// Where the trajectory that was found with all room gets no nearer to the goal, slowly and with less room if that does: else the
+  /// vehicle would go back and forth between two ways, on each of which only a narrow place is left.
+  void squeeze_on(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// From rest, out of where no search has room to where `room_m` is free: slowly, with the vehicle's own radius.
   void leave(double room_m, core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// Of a vehicle that turns: where no way is found, it looks at what is unknown on the way, and after a while from elsewhere.
@@ -206,6 +219,8 @@ class DecisionPipeline {
   [[nodiscard]] std::optional<Trajectory> stop_before_body(const DecisionInput& in, bool too_fast,
                                                            const stages::MapView& known, core::Work& work,
                                                            Nanos latency) const noexcept;
+  /// What is flown arrives no later than the new trajectory, and does not begin to brake before the next decision can replace it.
+  [[nodiscard]] bool is_kept(const DecisionInput& in, const DecisionOutput& out) const noexcept;
   /// Between the new trajectory, what is flown, and a stop.
   void choose(const DecisionInput& in, DecisionOutput& out) noexcept;
   /// What is left of the deadline for this stage, when the stages after it get what was predicted for them.
@@ -215,6 +230,9 @@ class DecisionPipeline {
 
   static constexpr double kAtRest_mps =
       0.05;  ///< What is flown stands, and does not begin to move: m/s2, too.
+
+  static constexpr double kCrawl_mps =
+      0.45;  ///< A stop from there takes little more than the room, and is not looked at.
 
   PipelineConfig config_;
   core::StageMeter& meter_;
@@ -241,7 +259,9 @@ class DecisionPipeline {
   Viewpoints viewpoints_;
   MonotonicTime thin_until_{};  ///< Something thin was seen less than kThinLasts before.
   bool is_narrow_{false};       ///< What is flown was planned so.
-  int failures_{0};             ///< Decisions in a row without a trajectory.
+  /// The fastest that a plan was lately, of which a straight stop was free everywhere (stops_free()).
+  double stopped_mps_ = std::numeric_limits<double>::infinity();
+  int failures_{0};  ///< Decisions in a row without a trajectory.
 };
 
 }  // namespace roborun::flight

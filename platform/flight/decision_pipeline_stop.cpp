@@ -1,5 +1,5 @@
-// Stops: where an autopilot's leads when the vehicle hears no commands any more, how soon a vehicle that stands decides, and how it
-// leaves a place without room.
+// Stops: where an autopilot's leads when the vehicle hears no commands any more, how soon a vehicle that stands decides, how it
+// squeezes through a narrow place, and how it leaves one without room.
 #include <algorithm>
 
 #include "platform/flight/decision_pipeline.hpp"
@@ -10,27 +10,92 @@
 
 namespace roborun::flight {
 
-bool DecisionPipeline::stops_free(const Trajectory& trajectory, const stages::MapView& view,
-                                  core::Work& work) const noexcept {
-  constexpr double kEvery_s = 0.25;
-  constexpr int kMost = 6;  // what is flown until a later plan has taken over, and more
-  constexpr double kSlow_mps = 0.5;
+bool DecisionPipeline::stops_free(const Trajectory& trajectory, MonotonicTime from, const DecisionOutput& out,
+                                  const stages::MapView& view, core::Work& work) const noexcept {
+  constexpr Nanos kReserve = std::chrono::milliseconds(50);
+  // The next decision may find nothing better than to brake: then this is flown so long, and the stop from there.
+  const MonotonicTime until = from + out.decision.point.deadline + kReserve;
+  Trajectory braked;
+  return stops_free(trajectory, from, until, view, work) &&
+         brake(trajectory.at(until), until, braked) == Status::kOk &&
+         stages::is_trajectory_free(view, braked, 0.0, config_.vehicle.radius_m, work.units) &&
+         stops_free(braked, until, until + from_seconds(braked.duration_s()), view, work);
+}
+
+bool DecisionPipeline::stops_free(const Trajectory& trajectory, MonotonicTime from, MonotonicTime until,
+                                  const stages::MapView& view, core::Work& work) const noexcept {
+  constexpr Nanos kEvery = std::chrono::milliseconds(250);
   constexpr double kAtOnce_mps3 = 1e3;
   const StoppingModel model = stopping_model(config_.vehicle);
-  for (int i = 0; i < kMost && i * kEvery_s < trajectory.duration_s(); ++i) {
-    TrajectoryPoint point = trajectory.at(trajectory.start_time + from_seconds(i * kEvery_s));
+  for (MonotonicTime t = from; t < until; t += kEvery) {
+    TrajectoryPoint point = trajectory.at(t);
     const double v_mps = point.v_W.norm();
-    if (v_mps < kSlow_mps) continue;
+    if (v_mps < kCrawl_mps + kAtRest_mps) continue;
     // As a stop that takes this distance.
     point.a_W.setZero();
     stages::MotionLimits straight = limits(v_mps);
     straight.acceleration_mps2 = 0.5 * v_mps * v_mps / model.distance_m(v_mps);
     straight.jerk_mps3 = kAtOnce_mps3;
     Trajectory stop;
-    if (smoother_.brake(point, trajectory.start_time, straight, stop) != Status::kOk) return false;
+    if (smoother_.brake(point, t, straight, stop) != Status::kOk) return false;
     if (!stages::is_trajectory_free(view, stop, 0.0, config_.vehicle.radius_m, work.units)) return false;
   }
   return true;
+}
+
+bool DecisionPipeline::may_squeeze() const noexcept {
+  constexpr double kSlowEnough = 1.05;  // of the slow speed: what trajectories keep to
+  const VehicleModel& vehicle = config_.vehicle;
+  return slow_radius_m(vehicle) < radius_m() &&
+         draft_.start.v_W.norm() <= kSlowEnough * vehicle.slow_speed_mps;
+}
+
+void DecisionPipeline::squeeze_on(const DecisionInput& in, core::StageBudget& budget,
+                                  DecisionOutput& out) noexcept {
+  constexpr double kNearer_m = 1.0;
+  if (!ways_known_) return;
+  const double wide_m = ways_->to_goal_m(draft_.trajectory.end_W());
+  if (wide_m < ways_->to_goal_m(draft_.start.p_W)) return;
+  const Trajectory wide = draft_.trajectory;
+  const stages::Path path_W = kept_W_;
+  search(in, slow_radius_m(config_.vehicle), out);
+  if (out.planner_status != Status::kStartBlocked) fit_narrow(budget, out);
+  if (draft_.is_narrow && ways_->to_goal_m(draft_.trajectory.end_W()) < wide_m - kNearer_m) return;
+  draft_.trajectory = wide;
+  draft_.is_narrow = false;
+  kept_W_ = path_W;
+  out.planner_status = out.smoother_status = Status::kOk;
+}
+
+void DecisionPipeline::slow_down(const DecisionInput& in, const stages::MapView& known,
+                                 core::StageBudget& budget, DecisionOutput& out) noexcept {
+  constexpr Nanos kEvery = std::chrono::milliseconds(500);
+  draft_.stops = true;
+  if (!config_.stops_straight || in.climbing || !std::isinf(draft_.committed_until_s)) return;
+  draft_.stops = stops_free(*in.committed, draft_.takes_over, out, known, draft_.smoother_work);
+  const bool is_found = out.smoother_status == Status::kOk;
+  if (draft_.stops || (is_found && !draft_.keeps && !is_kept(in, out))) return;
+  const Trajectory found = draft_.trajectory;
+  const stages::Path path_W = kept_W_;
+  const MonotonicTime ends = in.committed->start_time + from_seconds(in.committed->duration_s());
+  kept_W_.clear();
+  for (MonotonicTime t = draft_.takes_over; t < ends && kept_W_.size() + 1 < kept_W_.capacity(); t += kEvery)
+    (void)kept_W_.push_back(in.committed->at(t).p_W);
+  if (ends > draft_.takes_over) (void)kept_W_.push_back(in.committed->end_W());
+  const VehicleModel& vehicle = config_.vehicle;
+  const double speed_mps = out.decision.point.speed_limit_mps;
+  if (is_narrow_)
+    fit(budget, slow_radius_m(vehicle), std::min(speed_mps, vehicle.slow_speed_mps), out);
+  else
+    fit(budget, radius_m(), speed_mps, out);
+  if (out.smoother_status == Status::kOk) {
+    draft_.is_narrow = is_narrow_;
+    draft_.leaves = draft_.dodges = false;
+  } else if (is_found && !draft_.keeps) {
+    draft_.trajectory = found;
+    kept_W_ = path_W;
+    out.smoother_status = Status::kOk;
+  }
 }
 
 void DecisionPipeline::hasten(const DecisionInput& in, DecisionOutput& out) const noexcept {

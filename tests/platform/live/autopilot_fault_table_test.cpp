@@ -1,4 +1,4 @@
-/// The whole table: twenty moments of each of four flights.
+/// The whole table: twenty moments of each of four flights through environment 14 and through forests.
 #include "tests/platform/live/autopilot_faults.hpp"
 
 namespace roborun::live {
@@ -7,7 +7,11 @@ namespace {
 class AutopilotFaultTable : public ::testing::TestWithParam<AutopilotKind> {};
 
 TEST_P(AutopilotFaultTable, EndsWhereItIsWrittenAtTwentyMomentsOfEachFlight) {
-  expect_as_written(GetParam(), {1, 2, 3, 4}, 20, 160.0);
+  expect_as_written(mission::autopilot_config(GetParam()), mission::middle_world, {1, 2, 3, 4}, 20, 160.0);
+}
+
+TEST_P(AutopilotFaultTable, EndsAsWrittenInForests) {
+  expect_as_written(mission::near_sighted_config(GetParam()), mission::forest_world, {1, 2, 3, 4}, 20, 25.0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Both, AutopilotFaultTable,

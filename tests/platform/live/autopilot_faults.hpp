@@ -208,17 +208,18 @@ inline void print(const End& end, AutopilotKind kind, std::uint64_t seed) {
       end.nearest_m, why != nullptr ? "  WRONG: " : "", why != nullptr ? why : "");
 }
 
-/// Every fault at each of the moments in each of the worlds.
-inline void expect_as_written(AutopilotKind kind, const std::vector<std::uint64_t>& seeds, int moments,
-                              double last_s) {
-  const mission::MissionConfig config = mission::autopilot_config(kind);
+/// Every fault at each of the moments in each of the worlds, which `world_of` makes of a seed.
+inline void expect_as_written(const mission::MissionConfig& config,
+                              const std::function<sitl::World(std::uint64_t)>& world_of,
+                              const std::vector<std::uint64_t>& seeds, int moments, double last_s) {
+  const AutopilotKind kind = config.autopilot->kind;
   std::array<int, kFaultNames.size()> flights{}, right{};
   std::array<double, kFaultNames.size()> longest_m{}, nearest_m{};
   nearest_m.fill(1e9);
   double fastest_mps = 0.0;
   int touched = 0;
   for (const std::uint64_t seed : seeds) {
-    const sitl::World world = mission::middle_world(seed);
+    const sitl::World world = world_of(seed);
     core::CounterRng rng(100 + seed);
     std::vector<double> at_s;
     for (int i = 0; i < moments; ++i) at_s.push_back(rng.uniform(10.0, last_s));

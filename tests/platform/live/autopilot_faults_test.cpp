@@ -6,7 +6,9 @@ namespace {
 
 class AutopilotFaults : public ::testing::TestWithParam<AutopilotKind> {};
 
-TEST_P(AutopilotFaults, EndWhereItIsWritten) { expect_as_written(GetParam(), {1}, 1, 30.0); }
+TEST_P(AutopilotFaults, EndWhereItIsWritten) {
+  expect_as_written(mission::autopilot_config(GetParam()), mission::middle_world, {1}, 1, 30.0);
+}
 
 INSTANTIATE_TEST_SUITE_P(Both, AutopilotFaults,
                          ::testing::Values(AutopilotKind::kPx4, AutopilotKind::kArduCopter),

@@ -57,6 +57,52 @@ TEST_P(LinkCut, AtTenRandomMomentsTheVehicleStandsAndHasTouchedNothing) {
   EXPECT_GT(fastest_mps, 2.0) << "there was something to stop";
 }
 
+struct StraightStops {
+  int looked_at{}, blocked{};
+  double fastest_mps{}, x_m{};
+};
+
+/// Of a flight through a forest: where the stop after silence, straight on as far as the stopping model says, would have led
+/// at every tenth of a second. The world judges.
+StraightStops straight_stops(AutopilotKind kind, std::uint64_t seed, bool stops_straight) {
+  constexpr double kFrom_s = 8.0, kTo_s = 25.0, kMoves_mps = 0.5, kStep_m = 0.1;
+  constexpr int kEvery = 40;  // frames
+  const sitl::World world = forest_world(seed);
+  const auto sut = std::make_unique<AutopilotFlight>(world, near_sighted_config(kind), stops_straight);
+  const VehicleModel& vehicle = sut->config().vehicle;
+  StraightStops stops;
+  while (sut->now_s() < kTo_s && sut->stage() != firmware_if::AutopilotStage::kPilots) {
+    for (int k = 0; k < kEvery; ++k) sut->step();
+    const sitl::VehicleState& state = sut->truth();
+    const double v_mps = state.v_WB.norm();
+    if (sut->now_s() < kFrom_s || v_mps < kMoves_mps) continue;
+    bool is_free = true;
+    for (double s_m = 0.0; s_m < stopping_model(vehicle).distance_m(v_mps); s_m += kStep_m)
+      is_free = is_free && world.clearance_m(state.p_WB + s_m / v_mps * state.v_WB, 1.0) >= vehicle.radius_m;
+    ++stops.looked_at;
+    stops.blocked += is_free ? 0 : 1;
+    stops.fastest_mps = std::max(stops.fastest_mps, v_mps);
+    stops.x_m = state.p_WB.x();
+  }
+  std::printf("%s, forest %llu, %s: %d of %d stops blocked, fastest %.1f m/s, came to x = %.1f m\n",
+              to_string(kind), static_cast<unsigned long long>(seed), stops_straight ? "looked at" : "not",
+              stops.blocked, stops.looked_at, stops.fastest_mps, stops.x_m);
+  return stops;
+}
+
+TEST_P(LinkCut, WhereverItHappensAmongTreesTheStopStraightOnIsFree) {
+  int blocked_without = 0;
+  for (const std::uint64_t seed : {21U, 22U}) {
+    const StraightStops with = straight_stops(GetParam(), seed, true);
+    EXPECT_EQ(with.blocked, 0) << "forest " << seed;
+    EXPECT_GT(with.looked_at, 50);
+    EXPECT_GT(with.fastest_mps, 2.0) << "there was something to stop";
+    EXPECT_GT(with.x_m, 20.0) << "it got on";
+    blocked_without += straight_stops(GetParam(), seed, false).blocked;
+  }
+  EXPECT_GT(blocked_without, 5) << "or nothing is tested";
+}
+
 /// An ArduCopter that refuses what it is told stands still in our mode, for ever: PX4 would leave the mode by itself. The failsafe
 /// notices (it is not where it is led to, as in wind), and what does not follow the descent comes down by its own landing.
 TEST(DeafAutopilot, ComesDownByItsOwnLanding) {

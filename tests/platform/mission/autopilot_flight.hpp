@@ -5,6 +5,7 @@
 #include <deque>
 #include <vector>
 
+#include "core/executive/cost_profile.hpp"
 #include "platform/board/board_profile.hpp"
 #include "platform/flight/lockstep_flight.hpp"
 #include "platform/mission/flight_setup.hpp"
@@ -12,6 +13,7 @@
 #include "platform/sitl/aircraft/camera_rig.hpp"
 #include "platform/sitl/autopilot/autopilot_aircraft.hpp"
 #include "platform/sitl/world/generator.hpp"
+#include "platform/sitl/world/world_maker.hpp"
 #include "platform/vehicle/vehicle_file.hpp"
 
 namespace roborun::mission {
@@ -30,10 +32,28 @@ inline MissionConfig autopilot_config(AutopilotKind kind, bool tuned = false) {
   return config;
 }
 
+/// A vehicle that sees 10 m and decides ten times per second: what its autopilot's stop needs is all that there is.
+inline MissionConfig near_sighted_config(AutopilotKind kind) {
+  constexpr double kOfPaper = 0.1;
+  MissionConfig config = autopilot_config(kind);
+  set_vehicle(config, vehicle::load_vehicle("x500-six"));
+  config.flight.costs = core::slower(config.flight.costs, kOfPaper);
+  for (governor::LatencyModel& model : config.flight.model) model = governor::slower(model, kOfPaper);
+  return config;
+}
+
+/// Trees on all sides of it, one per 5 m.
+inline sitl::World forest_world(std::uint64_t seed) {
+  sitl::WorldMakerOptions options;
+  options.radius_m = vehicle::load_vehicle("x500-six").model.radius_m;
+  options.spacing_m = 5.0;
+  return sitl::World(sitl::make_world(sitl::WorldKind::kForest, seed, options));
+}
+
 class AutopilotFlight {
  public:
-  AutopilotFlight(const sitl::World& world, const MissionConfig& config)
-      : flight_config_(flight_config_of(world, config)),
+  AutopilotFlight(const sitl::World& world, const MissionConfig& config, bool stops_straight = true)
+      : flight_config_(configured(world, config, stops_straight)),
         rig_(world, config.simulator, config.seed, sitl::Readers::kTwo),
         body_(flight_config_.vehicle, config.simulator, ground_below(world), config.seed,
               config.flight.minor_frame, rig_),
@@ -88,6 +108,13 @@ class AutopilotFlight {
     for (firmware_if::DepthCamera* const camera : cameras)
       all.push_back(&switches_.emplace_back(*camera, cameras_are_dead_));
     return all;
+  }
+
+  static flight::FlightConfig configured(const sitl::World& world, const MissionConfig& config,
+                                         bool stops_straight) {
+    flight::FlightConfig flight = flight_config_of(world, config);
+    flight.stops_straight = stops_straight;
+    return flight;
   }
 
   flight::FlightConfig flight_config_;
