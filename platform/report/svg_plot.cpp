@@ -87,7 +87,11 @@ double draw_zooms(Svg& svg, const Scene& scene, const MissionReport& mission, co
        {std::tuple{"A", scene.bounds_W.min_W.x(), scene.zone_borders_m.front()},
         std::tuple{"C", scene.zone_borders_m.back(), scene.bounds_W.max_W.x()}}) {
     MissionReport inside = mission;
-    std::erase_if(inside.path, [&](const PathPoint& p) { return p.p_WB.x() < low_m || p.p_WB.x() > high_m; });
+    // Named again: Clang 14 captures no structured bindings.
+    const auto is_outside = [from_m = low_m, to_m = high_m](const PathPoint& p) {
+      return p.p_WB.x() < from_m || p.p_WB.x() > to_m;
+    };
+    std::erase_if(inside.path, is_outside);
     double low_y_m = scene.start_W.y();
     double high_y_m = scene.start_W.y();
     for (const PathPoint& p : inside.path) {
