@@ -286,8 +286,8 @@ void DecisionPipeline::fit(core::StageBudget& budget, double radius_m, double sp
   request.start_time = draft_.takes_over;
   request.radius_m = radius_m;
   meter_.charge_to(core::StageId::kSmoother);
-  // Of the speed: in small steps first, for in the open a little less is enough, and last as slowly as any stop is free. The next
-  // plan tries a little more than what went.
+  // Of the speed: in small steps first, for in the open a little less is enough, and last at a crawl. The next plan tries a
+  // little more than what went.
   constexpr std::array<double, 7> kShares{1.0, 0.95, 0.9, 0.85, 0.75, 0.55, 0.0};
   constexpr double kMore = 1.15, kMore_mps = 0.2;
   const double fastest_mps =
@@ -327,6 +327,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   draft_.planner_work = out.work[core::StageId::kPlanner];
   draft_.smoother_work = {};
   draft_.leaves = draft_.is_narrow = draft_.replaces = draft_.dodges = false;
+  draft_.stops = true;
   const Known known(*this, in);
   draft_.committed_until_s =
       free_until_s(known.view(), *in.committed, seconds(in.now - in.committed->start_time),
@@ -377,7 +378,7 @@ void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noex
     if (!draft_.keeps) find_trajectory(in, budget, out);
     if (config_.turns) look_on(in, budget, out);
     give_way(in, budget, out);
-    slow_down(in, Known(*this, in).view(), budget, out);
+    if (config_.stops_straight && !in.climbing) slow_down(in, Known(*this, in).view(), budget, out);
     charge(core::StageId::kPlanner, draft_.planner_work, out);
     double& searched_s = searched_s_[static_cast<std::size_t>(out.decision.point.p1_level)];
     searched_s = std::max(seconds(out.cost[core::StageId::kPlanner]), kForgets * searched_s);
@@ -404,7 +405,7 @@ void DecisionPipeline::find_trajectory(const DecisionInput& in, core::StageBudge
                                        DecisionOutput& out) noexcept {
   const double speed_mps = out.decision.point.speed_limit_mps;
   const bool may_be_narrow = may_squeeze(), was_narrow = draft_.is_narrow;
-  const bool may_narrow = may_be_narrow && !was_narrow;
+  const bool may_go_narrower = may_be_narrow && !was_narrow;
   const auto is_found = [&out] { return out.smoother_status == Status::kOk; };
   // First with room for the smoother to cut corners, then as tight as the vehicle can fly: too tight for
   // extra room is no reason to flee. Where it is narrower still, slowly.
@@ -414,7 +415,7 @@ void DecisionPipeline::find_trajectory(const DecisionInput& in, core::StageBudge
     fit(budget, radius_m(), speed_mps, out);
   }
   if (is_found()) {
-    if (may_narrow) squeeze_on(in, budget, out);
+    if (may_go_narrower) squeeze_on(in, budget, out);
     return;
   }
   search(in, radius_m(), out);
@@ -422,7 +423,7 @@ void DecisionPipeline::find_trajectory(const DecisionInput& in, core::StageBudge
     fit(budget, radius_m(), speed_mps, out);
   else if (!may_be_narrow)
     leave(radius_m(), budget, out);
-  if (!may_narrow) return;
+  if (!may_go_narrower) return;
   if (is_found()) return squeeze_on(in, budget, out);
   search(in, slow_radius_m(config_.vehicle), out);
   fit_narrow(budget, out);

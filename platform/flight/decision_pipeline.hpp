@@ -145,8 +145,8 @@ class DecisionPipeline {
     bool dodges{};     ///< The trajectory goes aside, out of the way of a body.
     /// Nothing is better than what is flown: it comes to rest at the goal, goes aside already, or meets a body latest.
     bool keeps{};
-    bool
-        stops{};  ///< What is flown may be flown until the next decision can brake it: always true of motors of our own.
+    /// What is flown may be flown until the next decision can brake it: always, of motors of our own.
+    bool stops{};
   };
 
   void charge(core::StageId id, const core::Work& work, DecisionOutput& out) noexcept;
@@ -231,8 +231,8 @@ class DecisionPipeline {
   static constexpr double kAtRest_mps =
       0.05;  ///< What is flown stands, and does not begin to move: m/s2, too.
 
-  static constexpr double kCrawl_mps =
-      0.45;  ///< A stop from there takes little more than the room, and is not looked at.
+  /// A stop from there takes little more than the room, and is not looked at.
+  static constexpr double kCrawl_mps = 0.45;
 
   PipelineConfig config_;
   core::StageMeter& meter_;

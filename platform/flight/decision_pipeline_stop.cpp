@@ -70,8 +70,7 @@ void DecisionPipeline::squeeze_on(const DecisionInput& in, core::StageBudget& bu
 void DecisionPipeline::slow_down(const DecisionInput& in, const stages::MapView& known,
                                  core::StageBudget& budget, DecisionOutput& out) noexcept {
   constexpr Nanos kEvery = std::chrono::milliseconds(500);
-  draft_.stops = true;
-  if (!config_.stops_straight || in.climbing || !std::isinf(draft_.committed_until_s)) return;
+  if (!std::isinf(draft_.committed_until_s)) return;
   draft_.stops = stops_free(*in.committed, draft_.takes_over, out, known, draft_.smoother_work);
   const bool is_found = out.smoother_status == Status::kOk;
   if (draft_.stops || (is_found && !draft_.keeps && !is_kept(in, out))) return;
