@@ -18,11 +18,11 @@ namespace roborun::board {
 
 /// Grows with every change of a class or struct that program and plugin both see: this file, part_request.hpp,
 /// Planner, OccupancyMap, Ways, MapView, StageBudget, DepthFrame, and what these are made of.
-inline constexpr std::uint32_t kPluginAbi = 8;
+inline constexpr std::uint32_t kPluginAbi = 9;
 
 /// A change that somebody forgot to count above, or another compiler or Eigen, shows in the sizes.
 [[nodiscard]] constexpr std::uint32_t plugin_layout() noexcept {
-  constexpr std::array<std::size_t, 14> kSizes{
+  constexpr std::array<std::size_t, 15> kSizes{
       sizeof(void*),
       __GXX_ABI_VERSION,
       sizeof(PartRequest),
@@ -34,6 +34,7 @@ inline constexpr std::uint32_t kPluginAbi = 8;
       sizeof(stages::IntegrationRequest),
       sizeof(stages::IntegrationResult),
       sizeof(stages::ExportRequest),
+      sizeof(stages::CellBlock),
       sizeof(stages::PlanRequest),
       sizeof(stages::PlanResult),
       sizeof(core::Work),

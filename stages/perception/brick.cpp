@@ -56,6 +56,12 @@ constexpr Word sure_in(Word word) noexcept {
   return (word >> 3U) & ((word >> 2U) | ((word >> 1U) & word)) & kOnes;
 }
 
+/// The lowest bit of each half byte that is evidence::kVague.
+constexpr Word vague_in(Word word) noexcept {
+  static_assert(evidence::kVague == 0b0100U);
+  return (word >> 2U) & ~(word | (word >> 1U) | (word >> 3U)) & kOnes;
+}
+
 /// evidence::after_miss() of those of sixteen cells whose half bytes are set in `selected`.
 template <bool kInPart, bool kOfTheThin>
 constexpr Word after_miss(Word word, Word selected) noexcept {
@@ -72,7 +78,7 @@ constexpr Word after_miss(Word word, Word selected) noexcept {
 }
 template <bool kInPart, bool kOfTheThin>
 constexpr bool ages_as_its_cells() noexcept {
-  for (const unsigned cell : {0U, 1U, 2U, 3U, 5U, 7U, 8U, 9U, 10U, 11U, 12U, 13U, 14U, 15U}) {
+  for (const unsigned cell : {0U, 1U, 2U, 3U, 4U, 5U, 7U, 8U, 9U, 10U, 11U, 12U, 13U, 14U, 15U}) {
     const unsigned aged = evidence::after_miss(cell, {kInPart, kOfTheThin});
     if (after_miss<kInPart, kOfTheThin>(kOnes * cell, kAll) != kOnes * aged) return false;
     if (after_miss<kInPart, kOfTheThin>(kOnes * cell, 0xF0) != (kOnes * cell ^ ((cell ^ aged) << 4U)))
@@ -153,6 +159,7 @@ void Brick::read(CellBlock& cells) const noexcept {
     const Word folded = not_free | (not_free >> 1U) | (not_free >> 2U) | (not_free >> 3U);
     const std::uint32_t free = gather_ones(~folded & kOnes);
     const std::uint32_t occupied = gather_ones(((word[w] >> 3U) & kOnes) | thin_in(word[w]));
+    const std::uint32_t vague = gather_ones(vague_in(word[w]));
     const std::uint32_t sure = gather_ones(sure_in(word[w]));
     for (unsigned pair = 0; pair < 4; ++pair) {
       const auto four = [pair](std::uint32_t bits) {
@@ -161,6 +168,7 @@ void Brick::read(CellBlock& cells) const noexcept {
       const std::size_t row = first_row + kBlockCells * (pair / 2) + pair % 2;
       cells.free[row] = static_cast<std::uint16_t>(cells.free[row] | (four(free) << cx));
       cells.occupied[row] = static_cast<std::uint16_t>(cells.occupied[row] | (four(occupied) << cx));
+      cells.vague[row] = static_cast<std::uint16_t>(cells.vague[row] | (four(vague) << cx));
       cells.sure[row] = static_cast<std::uint16_t>(cells.sure[row] | (four(sure) << cx));
     }
   }
@@ -187,10 +195,15 @@ void Brick::read_doubled(std::size_t eighth, CellBlock& cells) const noexcept {
     const Word other = flags ^ (kBytes * content::kFree);
     const unsigned free = gather(~(other | other >> 1U | other >> 2U) & kBytes);
     const unsigned occupied = gather(flags >> 1U & kBytes);
-    if ((free | occupied) == 0) continue;
-    unsigned sure = 0;
-    for (std::size_t half = 0; half < 8 && occupied != 0; ++half)
-      sure |= ((sure_in(word[4 * i + half / 2]) >> (32U * (half % 2))) & 0xFFFFFFFFU) != 0 ? 1U << half : 0U;
+    unsigned sure = 0, vague = 0;
+    for (std::size_t half = 0; half < 8; ++half) {
+      const auto has = [half](Word bits) {
+        return (bits >> (32U * (half % 2)) & 0xFFFFFFFFU) != 0 ? 1U << half : 0U;
+      };
+      sure |= has(sure_in(word[4 * i + half / 2]));
+      vague |= has(vague_in(word[4 * i + half / 2]));
+    }
+    if ((free | occupied | vague) == 0) continue;
     const auto [first_row, cx] = kPlaceOfWord[4 * i];
     const unsigned shift = cx / 2U + ((eighth & 1U) != 0 ? 8U : 0U);
     for (std::size_t pair = 0; pair < 4; ++pair) {
@@ -198,6 +211,7 @@ void Brick::read_doubled(std::size_t eighth, CellBlock& cells) const noexcept {
       cells.free[row] = static_cast<std::uint16_t>(cells.free[row] | (free >> (2U * pair) & 3U) << shift);
       cells.occupied[row] =
           static_cast<std::uint16_t>(cells.occupied[row] | (occupied >> (2U * pair) & 3U) << shift);
+      cells.vague[row] = static_cast<std::uint16_t>(cells.vague[row] | (vague >> (2U * pair) & 3U) << shift);
       cells.sure[row] = static_cast<std::uint16_t>(cells.sure[row] | (sure >> (2U * pair) & 3U) << shift);
     }
   }

@@ -47,9 +47,9 @@ struct Brick {
     has_new = has_new || is_new;
     set_cell(morton, is_new ? evidence::kMetNow : evidence::after_hit(before));
   }
-  /// A surface near this cell, nobody knows exactly where: what was free is unknown.
+  /// A surface near this cell, nobody knows exactly where: what was free is not any more.
   void add_vague_hit(std::uint32_t morton) noexcept {
-    if (!evidence::is_occupied(cell(morton))) set_cell(morton, evidence::kUnknown);
+    if (!evidence::is_occupied(cell(morton))) set_cell(morton, evidence::kVague);
   }
   /// Something thin in it.
   void add_thin(std::uint32_t morton) noexcept { set_cell(morton, evidence::kThin); }

@@ -15,6 +15,7 @@ inline constexpr std::size_t kCellsPerBrick = 4096;
 ///   0       unknown
 ///   1       free: seen past
 ///   2       seen past in part, once: still unknown
+///   4       unknown, but a surface is about here, too far away to say in which cell
 ///   3 5 7   something thin, evidence 1 .. 3: only looks that would have seen it take from it
 ///   6       a surface that this scan is the first to meet, of a camera that mixes: evidence kHit from the next refresh() on
 ///   8 .. 15 a surface, evidence 1 .. 8
@@ -24,13 +25,16 @@ namespace evidence {
 inline constexpr unsigned kUnknown = 0;
 inline constexpr unsigned kFree = 1;
 inline constexpr unsigned kPartlyFree = 2;
+inline constexpr unsigned kVague = 4;
 inline constexpr unsigned kThin = 7;      ///< As it is when it was just seen.
 inline constexpr unsigned kOccupied = 7;  ///< Plus the evidence.
 inline constexpr unsigned kHit = 3;
 inline constexpr unsigned kMetNow = 6;
 inline constexpr unsigned kMost = 8;
 
-[[nodiscard]] constexpr bool is_occupied(unsigned cell) noexcept { return cell > kPartlyFree; }
+[[nodiscard]] constexpr bool is_occupied(unsigned cell) noexcept {
+  return cell > kPartlyFree && cell != kVague;
+}
 [[nodiscard]] constexpr bool is_thin(unsigned cell) noexcept {
   return is_occupied(cell) && cell <= kThin && cell != kMetNow;
 }
@@ -49,7 +53,7 @@ struct Past {
 [[nodiscard]] constexpr unsigned after_miss(unsigned cell, Past past = {}) noexcept {
   if (is_thin(cell)) return past.of_the_thin ? cell - 2 : cell;
   if (is_occupied(cell)) return cell > kOccupied + 1 ? cell - 1 : kFree;
-  return past.in_part && cell == kUnknown ? kPartlyFree : kFree;
+  return past.in_part && (cell == kUnknown || cell == kVague) ? kPartlyFree : kFree;
 }
 }  // namespace evidence
 

@@ -21,6 +21,8 @@ struct CellBlock {
   CellRows free{};
   CellRows occupied{};
   CellRows sure{};  ///< Of the occupied: met in more than one look, and not only something thin.
+  CellRows
+      vague{};  ///< Of the unknown (of coarse cells: of all but the free): a surface is about there, nobody knows exactly where.
 };
 
 }  // namespace roborun::stages

@@ -65,6 +65,8 @@ void merge_eighth(const CellBlock& fine, std::size_t eighth, CellBlock& cells) n
       cells.free[to] = static_cast<std::uint16_t>(cells.free[to] | halved<false>(all) << shift);
       cells.occupied[to] =
           static_cast<std::uint16_t>(cells.occupied[to] | halved<true>(any_of(fine.occupied)) << shift);
+      cells.vague[to] =
+          static_cast<std::uint16_t>(cells.vague[to] | halved<true>(any_of(fine.vague)) << shift);
       cells.sure[to] = static_cast<std::uint16_t>(cells.sure[to] | halved<true>(any_of(fine.sure)) << shift);
     }
   }
@@ -94,6 +96,7 @@ BlockContent read_eighths(const MapView& view, const Vector3& corner_W, CellBloc
       ++free;
       fine.free.fill(0xFFFF);
       fine.occupied.fill(0);
+      fine.vague.fill(0);
       fine.sure.fill(0);
     }
     merge_eighth(fine, eighth, cells);

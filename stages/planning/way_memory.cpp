@@ -20,6 +20,14 @@ constexpr std::uint64_t kWorkOfABlock = 64;  // lookups that a block that change
 
 std::int32_t whole(double x) noexcept { return static_cast<std::int32_t>(std::floor(x)); }
 
+/// Whether some of the cells may be occupied, but not surely.
+bool is_doubtful(const CellBlock& cells) noexcept {
+  unsigned doubtful = 0;
+  for (std::size_t i = 0; i < cells.sure.size(); ++i)
+    doubtful |= (unsigned{cells.occupied[i]} ^ cells.sure[i]) | cells.vague[i];
+  return doubtful != 0;
+}
+
 std::uint64_t digest_of(const CellBlock& cells) noexcept {
   std::uint64_t digest = 1;
   for (std::size_t i = 0; i < cells.free.size(); i += 2) {
@@ -29,16 +37,16 @@ std::uint64_t digest_of(const CellBlock& cells) noexcept {
     digest = (digest ^ four) * 0x9E3779B97F4A7C15ULL;
     digest ^= digest >> 29U;
   }
-  if (cells.sure == cells.occupied) return digest;
-  for (const std::uint16_t row : cells.sure) digest = core::mix64(digest + row);
+  if (!is_doubtful(cells)) return digest;
+  for (std::size_t i = 0; i < cells.sure.size(); ++i)
+    digest = core::mix64(digest + (std::uint64_t{cells.vague[i]} << 16U | cells.sure[i]));
   return digest;
 }
 
-/// Whether some of the cells are occupied, but not surely.
+/// The same of all of them.
 bool has_doubts(const WayCells& cells) noexcept {
   for (std::size_t i = 0; i < cells.block.size(); ++i)
-    if (cells.content[i] == BlockContent::kMixed && cells.block[i]->sure != cells.block[i]->occupied)
-      return true;
+    if (cells.content[i] == BlockContent::kMixed && is_doubtful(*cells.block[i])) return true;
   return false;
 }
 
@@ -347,7 +355,7 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   find_places(cells, width_, 0, places);
   forbid(block, places);
   WayCells sure = cells;
-  if (has_doubts(cells)) sure.occupied = &CellBlock::sure;
+  sure.only_sure = has_doubts(cells);
   const auto all = [](const CellRows& rows, std::uint16_t value) {
     return std::all_of(rows.begin(), rows.end(), [value](std::uint16_t row) { return row == value; });
   };
@@ -367,7 +375,7 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   Block* b = take(position);
   if (b == nullptr) return;
   WayPlaces narrow;
-  if (narrow_width_ < width_ || sure.occupied != cells.occupied) find_places(sure, narrow_width_, 0, narrow);
+  if (narrow_width_ < width_ || sure.only_sure) find_places(sure, narrow_width_, 0, narrow);
   forbid(block, narrow);
   for (std::size_t i = 0; i < narrow.known.size(); ++i)
     places.doubtful[i] =

@@ -22,8 +22,8 @@ namespace roborun::stages {
 /// known to be free, or that may be. Doors join rooms of neighbouring blocks, and known with open ones. What was seen
 /// stays, whatever the map gives up. The search runs from the goal over rooms, known space at its length and open space
 /// at kUnknownWeight times its length, until it comes to the vehicle. Where that finds nothing and nothing is proved, it runs
-/// once more through doubtful places, too (a cell or two too narrow, not seen whole, or closed only by what is not surely there), which are dear: the vehicle goes there and looks closely. Exact in what is connected (for whole cells), coarse in
-/// lengths. Source: Dijkstra (1959), over the regions of Botea, Mueller, Schaeffer, "Near optimal hierarchical
+/// once more through doubtful places, too (a cell or two too narrow, not seen whole, or closed only by what is not surely there or vague),
+/// which are dear: the vehicle goes there and looks closely. Exact in what is connected (for whole cells), coarse in lengths. Source: Dijkstra (1959), over the regions of Botea, Mueller, Schaeffer, "Near optimal hierarchical
 /// path-finding" (2004).
 class WayMemory final : public Ways {
  public:

@@ -43,8 +43,7 @@ CellRows WayMemory::find_passable(const Cell& block, const WayCells& cells, cons
   WayPlaces cores;
   find_places(cells, core_width_, width_ - core_width_, cores);
   WayPlaces sure_cores = cores;
-  if (cells_if_sure.occupied != cells.occupied)
-    find_places(cells_if_sure, core_width_, width_ - core_width_, sure_cores);
+  if (cells_if_sure.only_sure) find_places(cells_if_sure, core_width_, width_ - core_width_, sure_cores);
   CellRows passable{};
   const std::array<std::int32_t, 3> first{kBlockCells * block.x + corner_.x,
                                           kBlockCells * block.y + corner_.y,

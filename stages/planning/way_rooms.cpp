@@ -17,8 +17,11 @@ void gather(const WayCells& cells, std::size_t side, WideRows& rows) noexcept {
         const std::size_t index = x + 2 * (y / kBlockCells) + 4 * (z / kBlockCells);
         std::uint64_t half = cells.content[index] == BlockContent::kFree ? 0 : std::uint64_t{0xFFFF} << 32U;
         if (cells.content[index] == BlockContent::kMixed) {
-          const auto not_free = static_cast<std::uint16_t>(~cells.block[index]->free[at]);
-          half = std::uint64_t{not_free} << 32U | (cells.block[index]->*cells.occupied)[at];
+          const CellBlock& block = *cells.block[index];
+          const auto not_free = static_cast<std::uint16_t>(~block.free[at]);
+          half =
+              std::uint64_t{not_free} << 32U |
+              (cells.only_sure ? unsigned{block.sure[at]} : unsigned{block.occupied[at]} | block.vague[at]);
         }
         row |= half << (16U * x);
       }

@@ -33,7 +33,7 @@ struct WayRooms {
 struct WayCells {
   std::array<const CellBlock*, 8> block{};
   std::array<BlockContent, 8> content{};
-  CellRows CellBlock::*occupied{&CellBlock::occupied};  ///< Which of them count: these, or the sure ones.
+  bool only_sure{};  ///< Of the occupied only the sure ones count; else what is vague does, too.
 };
 
 /// The rows of places of a block that are of one kind. width 1 .. 17.

@@ -15,7 +15,7 @@ namespace {
 using test::kInfinity;
 
 /// All that a cell can hold.
-constexpr std::array<unsigned, 14> kStates{0, 1, 2, 3, 5, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+constexpr std::array<unsigned, 15> kStates{0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 
 TEST(Brick, MipsSayWhatTheCellsSay) {
   core::CounterRng rng(1);
@@ -25,7 +25,7 @@ TEST(Brick, MipsSayWhatTheCellsSay) {
   for (std::uint32_t m = 0; m < kCellsPerBrick; ++m) {
     const auto kind = static_cast<unsigned>(rng.below(30));
     sut->set_cell(m, kind < kStates.size() ? kStates[kind] : evidence::kFree);
-    known += sut->cell(m) != evidence::kUnknown && sut->cell(m) != evidence::kPartlyFree ? 1U : 0U;
+    known += sut->cell(m) == evidence::kFree || evidence::is_occupied(sut->cell(m)) ? 1U : 0U;
   }
   sut->refresh();
   EXPECT_EQ(sut->known_count, known);
@@ -54,7 +54,7 @@ TEST(Brick, ReadsWhatIsFreeOccupiedAndSurelyOccupied) {
   const auto bit = [](const CellRows& rows, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
     return ((rows[16 * z + y] >> x) & 1) != 0;
   };
-  CellRows expected{};
+  CellRows expected{}, expected_vague{};
   for (std::uint32_t i = 0; i < kCellsPerBrick; ++i) {
     const std::uint32_t x = i % 16, y = i / 16 % 16, z = i / 256;
     const unsigned cell = sut->cell(morton3(x, y, z));
@@ -62,11 +62,15 @@ TEST(Brick, ReadsWhatIsFreeOccupiedAndSurelyOccupied) {
     ASSERT_EQ(bit(cells.occupied, x, y, z), evidence::is_occupied(cell));
     const bool sure = cell > evidence::kOccupied && cell > evidence::after_hit(evidence::kFree);
     ASSERT_EQ(bit(cells.sure, x, y, z), sure) << cell;
-    std::uint16_t& row = expected[16 * (z / 2 + 8) + y / 2 + 8];
-    if (sure) row = static_cast<std::uint16_t>(row | 1U << (x / 2));
+    ASSERT_EQ(bit(cells.vague, x, y, z), cell == evidence::kVague);
+    const std::uint32_t row = 16 * (z / 2 + 8) + y / 2 + 8;
+    const auto half = [x](std::uint16_t& r) { r = static_cast<std::uint16_t>(r | 1U << (x / 2)); };
+    if (sure) half(expected[row]);
+    if (cell == evidence::kVague) half(expected_vague[row]);
   }
   EXPECT_EQ(doubled.sure, expected);
   EXPECT_NE(doubled.sure, doubled.occupied);
+  EXPECT_EQ(doubled.vague, expected_vague);
 }
 
 TEST(Brick, EvidenceIsBounded) {
@@ -123,6 +127,22 @@ TEST(Brick, OnlyLooksThatWouldHaveMetItTakeFromWhatIsThin) {
   EXPECT_TRUE(evidence::is_occupied(cell));
   EXPECT_EQ(evidence::after_hit(cell), evidence::kThin) << "seen again";
   EXPECT_EQ(evidence::after_miss(cell, {.of_the_thin = true}), evidence::kFree);
+}
+
+TEST(Brick, AVagueSurfaceIsUnknownUntilItIsMetOrSeenPast) {
+  auto sut = std::make_unique<Brick>();
+  sut->fill(evidence::kFree);
+  sut->add_vague_hit(7);
+  sut->refresh();
+  EXPECT_EQ(sut->cell(7), evidence::kVague) << "what was free is so no longer";
+  EXPECT_EQ(sut->flags(0, 7), content::kUnknown);
+  EXPECT_EQ(sut->known_count, kCellsPerBrick - 1);
+  sut->add_hit(7);
+  EXPECT_EQ(sut->cell(7), evidence::after_hit(evidence::kUnknown)) << "as if nothing had been known";
+  sut->add_vague_hit(7);
+  EXPECT_TRUE(evidence::is_occupied(sut->cell(7))) << "what is known better stays";
+  EXPECT_EQ(evidence::after_miss(evidence::kVague), evidence::kFree);
+  EXPECT_EQ(evidence::after_miss(evidence::kVague, {.in_part = true}), evidence::kPartlyFree);
 }
 
 TEST(Brick, FreesBlocksAsItWouldTheirCells) {

@@ -1,6 +1,7 @@
 // What a map makes of images as real cameras give them: holes, mixed pixels, noise, thin things.
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <functional>
 #include <memory>
 
@@ -62,6 +63,18 @@ class NoisyImages : public ::testing::Test {
         for (double z = box.min_W.z(); z <= box.max_W.z(); z += 0.3)
           cells += at(Vector3(x, y, z)) == state ? 1 : 0;
     return cells;
+  }
+
+  /// Vague cells in the block around p_W.
+  int vague_around(const Vector3& p_W) {
+    const MapView& view = sut_->view();
+    const double edge_m = block_m(view.finest_m());
+    const Vector3 corner_W = edge_m * (p_W / edge_m).array().floor().matrix();
+    CellBlock cells;
+    if (view.read(corner_W, view.finest_m(), cells, lookups_) != BlockContent::kMixed) return 0;
+    int sum = 0;
+    for (const std::uint16_t row : cells.vague) sum += std::popcount(row);
+    return sum;
   }
 
   std::vector<std::byte> block_;
@@ -258,6 +271,8 @@ TEST_F(NoisyImages, FarSurfacesOfANoisyCameraAreUnknownUntilTheyAreNear) {
   const Aabb front{Vector3(7.85, -1.65, 1.05), Vector3(8.15, 1.65, 8.0)};
   EXPECT_EQ(count(front, CellState::kOccupied), 0) << "0.65 m at 8 m";
   EXPECT_EQ(count(front, CellState::kFree), 0);
+  const int vague = vague_around(Vector3(8.0, 0.5, 5.0));
+  EXPECT_GT(vague, 100) << "but something is about there";
   at_ = Vector3(4.0, 0.2, 5.0);
   see(
       [](auto& image) {
@@ -265,6 +280,7 @@ TEST_F(NoisyImages, FarSurfacesOfANoisyCameraAreUnknownUntilTheyAreNear) {
       },
       error);
   EXPECT_GT(count(front, CellState::kOccupied), 100) << "0.17 m at 4 m";
+  EXPECT_LT(vague_around(Vector3(8.0, 0.5, 5.0)), vague / 2);
 }
 
 /// A surface that a mixing camera shows is where it says with 1.5 sigma in a cell, or it is not occupied.

@@ -200,6 +200,20 @@ TEST_F(WayMemoryTest, ASurfaceThatWasMetOnceIsLookedAtAgainBeforeItProvesAnythin
   EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath) << "met again";
 }
 
+TEST_F(WayMemoryTest, WhereASurfaceIsAboutItGoesOnlyIfThereIsNoOtherWay) {
+  // A wall that is seen from far away: nobody knows yet which of its cells are occupied.
+  box(-15, 20, 20.6, 20.6);
+  box(-15, -20.6, 20.6, -20);
+  view_.vague.push_back({Vector3(20, -21, 0), Vector3(20.6, 21, 20)});
+  make();
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  EXPECT_GT(std::fabs(last_known(start_W_).y()), 10.0) << "it is open behind: around the outside";
+  box(-15.6, -21, -15, 21);
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk) << "nothing is proved by it";
+  EXPECT_GT(last_known(start_W_).x(), 17.0) << "goes there to look closely";
+  EXPECT_LT(last_known(start_W_).x(), 20.0) << "and no farther";
+}
+
 TEST_F(WayMemoryTest, AHoleInAWallThatNobodySawIsAWayUntilItIsSeenToBeTooNarrow) {
   // Two cells of a wall: what surely fits inside the vehicle, which plans with six.
   config_.body_m = 0.6;
