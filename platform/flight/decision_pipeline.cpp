@@ -19,10 +19,6 @@ constexpr double kCornerRoom_m = 0.25;
 constexpr double kAtGoal_m = 0.3;
 constexpr double kTooFast = 1.5;
 constexpr double kForgets = 0.9;  // what the planner took, from one decision to the next
-/// So many pixels of a decision's images show something thin where poles or wires are: 40 to 900 in worlds of them. In environment
-/// 14 they are at most 3 (clean cameras), 23 (d455).
-constexpr std::uint32_t kThinPixels = 32;
-constexpr Nanos kThinLasts{5'000'000'000};
 /// Of the vehicle's speed: what known way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
 constexpr double kBeyond = 0.5;
 
@@ -163,7 +159,7 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
 
 void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noexcept {
   out.decision = policy_.decide(out.profile, {failures_, (in.goal_W - in.p_WB).norm(), in.climbing,
-                                              out.motion, in.now < thin_until_, is_narrow_});
+                                              out.motion, is_among_thin(in), is_narrow_});
   if (out.decision.predicted_s[core::StageId::kGovernor] > 0.0) charge(core::StageId::kGovernor, {}, out);
 }
 
@@ -210,7 +206,7 @@ void DecisionPipeline::integrate(const DecisionInput& in, DecisionOutput& out) n
     work.level = integrated.work.level;
     thin_pixels += integrated.thin_pixels;
   }
-  if (thin_pixels >= kThinPixels) thin_until_ = in.now + kThinLasts;
+  note_thin(in, thin_pixels);
   charge(core::StageId::kMap, work, out);
 }
 
@@ -468,6 +464,7 @@ void DecisionPipeline::forget() noexcept {
   bodies_ = {};
   dodges_at_ = MonotonicTime::min();
   thin_until_ = {};
+  thin_from_W_.reset();
   viewpoints_ = {};
   kept_W_.clear();
   look_W_.reset();

@@ -153,6 +153,10 @@ class DecisionPipeline {
   void perceive(const DecisionInput& in, DecisionOutput& out) noexcept;
   void govern(const DecisionInput& in, DecisionOutput& out) noexcept;
   void integrate(const DecisionInput& in, DecisionOutput& out) noexcept;
+  /// So many pixels of this decision's images show something thin.
+  void note_thin(const DecisionInput& in, std::uint32_t pixels) noexcept;
+  /// Something thin was seen lately, or near here.
+  [[nodiscard]] bool is_among_thin(const DecisionInput& in) const noexcept;
   /// Half edges of the box that a vehicle at the top of its climb takes to be free (IntegrationRequest).
   [[nodiscard]] Vector3 assumed_half_m(const DecisionInput& in) const noexcept;
   /// What is flown, on the map that just got its images.
@@ -257,8 +261,9 @@ class DecisionPipeline {
   MonotonicTime blocked_since_{};    ///< Standing without a way, and the looks so far led nowhere.
   MonotonicTime back_until_{};       ///< It goes to see more: nothing else is planned.
   Viewpoints viewpoints_;
-  MonotonicTime thin_until_{};  ///< Something thin was seen less than kThinLasts before.
-  bool is_narrow_{false};       ///< What is flown was planned so.
+  MonotonicTime thin_until_{};            ///< Something thin was seen less than kThinLasts before,
+  std::optional<Vector3> thin_from_W_{};  ///< the last time from here.
+  bool is_narrow_{false};                 ///< What is flown was planned so.
   /// The fastest that a plan was lately, of which a straight stop was free everywhere (stops_free()).
   double stopped_mps_ = std::numeric_limits<double>::infinity();
   int failures_{0};  ///< Decisions in a row without a trajectory.

@@ -1,6 +1,7 @@
 #include "platform/flight/near_watch.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/geometry/camera_pose.hpp"
 #include "platform/flight/flight_control.hpp"
@@ -18,7 +19,7 @@ constexpr double kSigmasOff = 2.0;
 constexpr std::size_t kEnough = 3;       // pixels
 constexpr std::size_t kAtOnce = 16'384;  // pixels a minor frame
 constexpr Nanos kAgo{10'000'000};        // where it is: the newest state may be of this very frame
-constexpr double kAlong = 0.5;           // cosine of 60 degrees
+constexpr double kAlongCos = 0.5, kAlongSin = 0.8660254037844386;  // of 60 degrees
 
 }  // namespace
 
@@ -55,7 +56,11 @@ void NearWatch::take_image(const Input& in) noexcept {
   Pose X_WB;
   if (!way_W(in, way) || in.past.pose_at(in.now - kAgo, X_WB) != Status::kOk) return;
   const Vector3 end_C = core::camera_pose(X_WB, camera.mount()).inverse_times(way.back());
-  if (end_C.x() < kAlong * end_C.norm()) return;
+  // 60 degrees beside the way at most, and what the body is wide at its end: of a slow vehicle what it would touch is at the edge of
+  // what looks along the way, or beyond it.
+  const double end_m = end_C.norm(), radius_m = config_.radius_m;
+  const double edge_m = std::sqrt(end_m * end_m + radius_m * radius_m);
+  if (end_C.x() * edge_m < (kAlongCos * end_m - kAlongSin * radius_m) * end_m) return;
   read_[camera_] = in.now;
   firmware_if::DepthFrame frame;
   if (camera.read(frame) != Status::kOk || in.past.pose_at(frame.stamp, X_WB) != Status::kOk) return;

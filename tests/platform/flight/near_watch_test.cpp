@@ -182,14 +182,23 @@ TEST_F(Near, DoesNotBrakeForWhatIsNotInTheWay) {
 }
 
 TEST_F(Near, LooksWhereItFlies) {
-  camera_ = {WireCamera(96, 180.0), WireCamera(96, 70.0), WireCamera(96, 50.0), WireCamera(96)};
-  EXPECT_TRUE(brakes_at_m(6.0));
+  camera_ = {WireCamera(96, 180.0), WireCamera(96, 80.0), WireCamera(96, 50.0), WireCamera(96)};
+  fly(4.0);
+  EXPECT_TRUE(brakes_at_m(20.0));
   EXPECT_EQ(camera_[0].reads, 0) << "it looks back";
-  EXPECT_EQ(camera_[1].reads, 0);
+  EXPECT_EQ(camera_[1].reads, 0) << "what it shows is beside a way of 4 m";
   for (const std::size_t i : {2U, 3U}) {
     EXPECT_GT(camera_[i].reads, 10);
     EXPECT_LT(camera_[i].reads, 60) << "ten images a second";
   }
+}
+
+TEST_F(Near, OfASlowVehicleWhatLooksAsideSeesWhatItWouldTouch) {
+  camera_ = {WireCamera(96, 180.0), WireCamera(96, 90.0), WireCamera(96)};
+  fly(0.6);
+  EXPECT_TRUE(brakes_at_m(3.0));
+  EXPECT_EQ(camera_[0].reads, 0) << "it looks back";
+  EXPECT_GT(camera_[1].reads, 10) << "its way is shorter than the body is wide";
 }
 
 TEST_F(Near, DoesNotBelieveACameraThatDecisionsRefuse) {
