@@ -1,4 +1,5 @@
-// What a vehicle that does not see all around does where no way is found: it looks, and goes to where it sees more. And what it saw that is thin.
+// What a vehicle that does not see all around does where no way is found: it looks, and goes to where it sees more.
+// What a decision remembers of thin things.
 #include <algorithm>
 #include <array>
 

@@ -196,7 +196,7 @@ void Brick::read_doubled(std::size_t eighth, CellBlock& cells) const noexcept {
     const unsigned free = gather(~(other | other >> 1U | other >> 2U) & kBytes);
     const unsigned occupied = gather(flags >> 1U & kBytes);
     unsigned sure = 0, vague = 0;
-    for (std::size_t half = 0; half < 8; ++half) {
+    for (std::size_t half = 0; half < 8 && free != 0xFFU; ++half) {
       const auto has = [half](Word bits) {
         return (bits >> (32U * (half % 2)) & 0xFFFFFFFFU) != 0 ? 1U << half : 0U;
       };
