@@ -353,7 +353,8 @@ void DecisionPipeline::remember(const DecisionInput& in, DecisionOutput& out) no
   ways_known_ = false;
   if (ways_ == nullptr) return;
   core::Work work;
-  Status status = ways_->look(map_.view(), in.p_WB, config_.horizon_m + 1.0, *draft_.planner_budget, work);
+  Status status =
+      ways_->look(map_.view(), {in.now, in.p_WB, config_.horizon_m + 1.0}, *draft_.planner_budget, work);
   if (status == Status::kOk) status = ways_->solve(draft_.start.p_W, in.goal_W, *draft_.planner_budget, work);
   ways_known_ = status == Status::kOk;
   out.ways_status = status;
@@ -468,6 +469,7 @@ void DecisionPipeline::forget() noexcept {
   viewpoints_ = {};
   kept_W_.clear();
   look_W_.reset();
+  looks_next_.reset();
   left_W_.reset();
   has_planned_ = false;
 }

@@ -210,8 +210,12 @@ class DecisionPipeline {
   [[nodiscard]] std::optional<Vector3> known_end_W() const noexcept;
   /// What it looks at: that place, or from there on the goal.
   [[nodiscard]] Vector3 undecided_W(const DecisionInput& in) const noexcept;
-  /// From where it looks, and look_W_ there: whence most is seen of what is unknown around known_end_W(), or else from farther off.
-  [[nodiscard]] std::optional<Vector3> viewpoint_W() noexcept;
+  /// Where it goes to see more, and what it looks at from there.
+  struct Look {
+    Vector3 from_W, at_W;
+  };
+  /// Whence most is seen of what is unknown around known_end_W(), or else from farther off.
+  [[nodiscard]] std::optional<Look> find_look(const DecisionInput& in) noexcept;
   /// Where what was found meets a body that moves: slower, a stop, or to the side, whatever meets none, or the latest.
   void give_way(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// Aside, a few metres in eight directions: the one that meets nothing and ends nearest to the goal. It begins where
@@ -258,8 +262,9 @@ class DecisionPipeline {
   Draft draft_;
   std::array<double, kPrecisionLevels> searched_s_{};  ///< By level of p1: what the planner took lately.
   std::optional<Vector3> look_W_{};  ///< What it looks at while it stands without a way, or goes to see more.
-  MonotonicTime blocked_since_{};    ///< Standing without a way, and the looks so far led nowhere.
-  MonotonicTime back_until_{};       ///< It goes to see more: nothing else is planned.
+  std::optional<Look> looks_next_{};  ///< No path to it was found yet.
+  MonotonicTime blocked_since_{};     ///< Standing without a way, and the looks so far led nowhere.
+  MonotonicTime back_until_{};        ///< It goes to see more: nothing else is planned.
   Viewpoints viewpoints_;
   MonotonicTime thin_until_{};            ///< Something thin was seen less than kThinLasts before,
   std::optional<Vector3> thin_from_W_{};  ///< the last time from here.

@@ -41,25 +41,25 @@ Vector3 DecisionPipeline::undecided_W(const DecisionInput& in) const noexcept {
   return core::hypot2(offset.x(), offset.y()) > kHere_m ? end_W : in.goal_W;
 }
 
-std::optional<Vector3> DecisionPipeline::viewpoint_W() noexcept {
+std::optional<DecisionPipeline::Look> DecisionPipeline::find_look(const DecisionInput& in) noexcept {
+  const Vector3 at_W = undecided_W(in);
   if (const std::optional<Vector3> end_W = known_end_W()) {
     const stages::FencedView fenced(map_.view(), config_.fence);
     const stages::FinestView finest(fenced);
     core::Work& work = draft_.planner_work;
     const stages::PolledView view(finest, *draft_.planner_budget, work);
-    auto to_W = viewpoints_.next(
+    const auto from_W = viewpoints_.next(
         view, {*end_W, slow_radius_m(config_.vehicle), config_.level_view_ratio, config_.flight_bounds_W},
         work.units);
-    if (to_W) {
-      look_W_ = end_W;
-      return to_W;
-    }
+    if (from_W) return Look{*from_W, *end_W};
+    // All was looked at, and the way still leads there: the next time from the first one again.
+    if (!view.spent()) viewpoints_ = {};
   }
-  Vector3 away_W = draft_.start.p_W - *look_W_;
+  Vector3 away_W = draft_.start.p_W - at_W;
   away_W.z() = 0.0;
   const double far_m = core::hypot2(away_W.x(), away_W.y());
   if (!(far_m > kHere_m)) return std::nullopt;
-  return draft_.start.p_W + kStepBack_m / far_m * away_W;
+  return Look{draft_.start.p_W + kStepBack_m / far_m * away_W, at_W};
 }
 
 void DecisionPipeline::look_on(const DecisionInput& in, core::StageBudget& budget,
@@ -67,19 +67,24 @@ void DecisionPipeline::look_on(const DecisionInput& in, core::StageBudget& budge
   const bool stands = draft_.start.v_W.norm() <= kAtRest_mps && !in.climbing;
   if (out.smoother_status == Status::kOk || !stands) {
     look_W_.reset();
+    looks_next_.reset();
     return;
   }
   if (!look_W_) blocked_since_ = std::max(blocked_since_, in.now - kLookAgain + kLookFirst);
   look_W_ = undecided_W(in);
-  if (in.now - blocked_since_ < kLookAgain) return;
-  blocked_since_ = in.now;
   meter_.charge_to(core::StageId::kPlanner);
-  const std::optional<Vector3> to_W = viewpoint_W();
-  if (!to_W) return;
+  if (in.now - blocked_since_ >= kLookAgain) {
+    blocked_since_ = in.now;
+    looks_next_ = find_look(in);
+  }
+  if (!looks_next_) return;
+  look_W_ = looks_next_->at_W;
   const double radius = slow_radius_m(config_.vehicle);
   const Status planned = out.planner_status;
   draft_.planner_work.volume_m3 = 0.0;
-  search_to(*to_W, in, radius, out);
+  search_to(looks_next_->from_W, in, radius, out);
+  // What had no time to end is searched for once more in the next decision, which has more.
+  if (out.planner_status != Status::kBudgetSpent) looks_next_.reset();
   if (out.planner_status == Status::kOk) fit(budget, radius, kSlowly_mps, out);
   if (out.smoother_status == Status::kOk)
     back_until_ = draft_.trajectory.start_time + from_seconds(draft_.trajectory.duration_s()) + kSettles;

@@ -15,7 +15,7 @@ constexpr std::int32_t kWindow = 13, kWindowHeight = 9;  // blocks of one look, 
 constexpr std::size_t kWindowBlocks =
     static_cast<std::size_t>(kWindow + 1) * (kWindow + 1) * (kWindowHeight + 1);
 constexpr double kStands_m = 0.3;  // from one look to the next
-constexpr int kMostWaits = 128;
+constexpr Nanos kMostWaited{12'800'000'000};
 constexpr std::uint64_t kWorkOfABlock = 64;  // lookups that a block that changed counts as
 
 std::int32_t whole(double x) noexcept { return static_cast<std::int32_t>(std::floor(x)); }
@@ -131,7 +131,7 @@ void WayMemory::forget() noexcept {
   ++search_;  // what was found by the last one is not there any more
   doubts_ = false;
   turn_ = 0;
-  looked_from_W_ = Vector3::Constant(1e9);
+  last_look_ = kNoLook;
   seen_low_ = {0, 0, 0};
   seen_high_ = {-1, -1, -1};
 }
@@ -250,12 +250,13 @@ std::uint64_t WayMemory::cells_at(const Cell& block, WayCells& cells) const noex
   return digest | 1U;
 }
 
-Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, core::StageBudget& budget,
+Status WayMemory::look(const MapView& map, const WayLook& look, core::StageBudget& budget,
                        core::Work& work) noexcept {
-  if (!is_finite(p_W) || !(p_W.cwiseAbs().maxCoeff() < kMost_m)) return Status::kInvalidArgument;
-  const Cell at = place_of(p_W);
+  if (!is_finite(look.from_W) || !(look.from_W.cwiseAbs().maxCoeff() < kMost_m))
+    return Status::kInvalidArgument;
+  const Cell at = place_of(look.from_W);
   const auto blocks =
-      static_cast<std::int32_t>(std::ceil(std::fmin(reach_m, kMost_m) / block_m(config_.finest_m)));
+      static_cast<std::int32_t>(std::ceil(std::fmin(look.reach_m, kMost_m) / block_m(config_.finest_m)));
   const std::int32_t side = std::min(blocks, (kWindow - 1) / 2),
                      up = std::min(blocks, (kWindowHeight - 1) / 2);
   const Cell low{std::max((at.x >> 4) - side, 0), std::max((at.y >> 4) - side, 0),
@@ -268,7 +269,7 @@ Status WayMemory::look(const MapView& map, const Vector3& p_W, double reach_m, c
   seen_low_ = {std::min(seen_low_.x, low.x), std::min(seen_low_.y, low.y), std::min(seen_low_.z, low.z)};
   seen_high_ = {std::max(seen_high_.x, high.x), std::max(seen_high_.y, high.y),
                 std::max(seen_high_.z, high.z)};
-  wait_at(p_W);
+  wait_at(look);
   const bool is_whole = renew_changed(low, high, budget, work);
   return is_whole ? Status::kOk : Status::kBudgetSpent;
 }
@@ -305,16 +306,17 @@ bool WayMemory::renew_changed(const Cell& low, const Cell& high, core::StageBudg
   return is_whole;
 }
 
-void WayMemory::wait_at(const Vector3& p_W) noexcept {
-  const bool stands = (p_W - looked_from_W_).norm() < kStands_m;
-  looked_from_W_ = p_W;
+void WayMemory::wait_at(const WayLook& look) noexcept {
+  const bool stands = (look.from_W - last_look_.from_W).norm() < kStands_m;
+  const auto units = std::clamp(look.now - last_look_.now, Nanos{0}, kMostWaited) / kWaitUnit;
+  last_look_ = look;
   if (!stands) return;
-  const Cell at = place_of(p_W);
+  const Cell at = place_of(look.from_W);
   for (std::int32_t i = 0; i < 27; ++i) {
     const Cell block{(at.x >> 4) + i % 3 - 1, (at.y >> 4) + i / 3 % 3 - 1, (at.z >> 4) + i / 9 - 1};
     if (!has(block)) continue;
-    std::uint16_t& waits = position_[position_of(block)].waits;
-    waits = static_cast<std::uint16_t>(std::min(waits + 1, kMostWaits));
+    std::uint16_t& waited = position_[position_of(block)].waited;
+    waited = static_cast<std::uint16_t>(std::min<Nanos::rep>(waited + units, kMostWaited / kWaitUnit));
   }
 }
 
@@ -378,8 +380,8 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   if (narrow_width_ < width_ || sure.only_sure) find_places(sure, narrow_width_, 0, narrow);
   forbid(block, narrow);
   for (std::size_t i = 0; i < narrow.known.size(); ++i)
-    places.doubtful[i] =
-        static_cast<std::uint16_t>((narrow.known[i] | narrow.open[i]) & ~places.known[i] & ~places.open[i]);
+    places.doubtful[i] = static_cast<std::uint16_t>((places.doubtful[i] | narrow.known[i] | narrow.open[i]) &
+                                                    ~places.known[i] & ~places.open[i]);
   number_rooms(places, b->rooms);
   b->passable = passable;
 }

@@ -46,7 +46,7 @@ class WayMemory final : public Ways {
   /// Preconditions, asserted: fits(config), and the arena has arena_bytes().
   WayMemory(const Config& config, core::Arena& arena) noexcept;
 
-  [[nodiscard]] Status look(const MapView& map, const Vector3& p_W, double reach_m, core::StageBudget& budget,
+  [[nodiscard]] Status look(const MapView& map, const WayLook& look, core::StageBudget& budget,
                             core::Work& work) noexcept override;
   [[nodiscard]] Status solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
                              core::Work& work) noexcept override;
@@ -83,7 +83,7 @@ class WayMemory final : public Ways {
   static constexpr std::int32_t kOpen = -1, kKnown = -2, kClosed = -3;
   struct Position {
     std::int32_t kind{kOpen};
-    std::uint16_t waits{};   ///< Looks during which the vehicle stood beside it.
+    std::uint16_t waited{};  ///< How long the vehicle stood beside it, in kWaitUnit.
     bool is_new{};           ///< In this look; false between looks.
     std::uint64_t digest{};  ///< Of the cells that its places touch, when it was last looked at; 0: never.
   };
@@ -95,6 +95,8 @@ class WayMemory final : public Ways {
     BlockContent content{};
     std::uint64_t digest{};
   };
+  static constexpr Nanos kWaitUnit{10'000'000};
+  static inline const WayLook kNoLook{.from_W = Vector3::Constant(1e9)};
   static constexpr std::uint32_t kFar = 0xFFFFFFFFU;
   static constexpr std::uint32_t kNowhere = 0xFFFFFFFFU;
   static constexpr double kMost_m = 1e5;  ///< Of any coordinate.
@@ -172,7 +174,7 @@ class WayMemory final : public Ways {
   /// Of a metre in a room.
   [[nodiscard]] double price(std::uint32_t position, unsigned room) const noexcept;
   [[nodiscard]] std::uint32_t step_cost(const Cell& from, const Cell& to, double price) const noexcept;
-  void wait_at(const Vector3& p_W) noexcept;
+  void wait_at(const WayLook& look) noexcept;
 
   /// Of a block: where the body may fit, by what is surely occupied. What of it nobody has seen joins the open places: it may turn out to have room.
   [[nodiscard]] CellRows find_passable(const Cell& block, const WayCells& cells,
@@ -224,7 +226,7 @@ class WayMemory final : public Ways {
   core::LeastFirst reached_;
   bool overflown_{};
   bool doubts_{};  ///< The search takes doubtful rooms, too: without them there was no way.
-  Vector3 looked_from_W_ = Vector3::Constant(1e9);
+  WayLook last_look_ = kNoLook;
   Cell seen_low_{0, 0, 0}, seen_high_{-1, -1, -1};  ///< Of all blocks looked at.
   Cell low_{}, high_{};                             ///< What the search runs in.
 };

@@ -72,6 +72,8 @@ CellRows WayMemory::find_passable(const Cell& block, const WayCells& cells, cons
     }
     places.open[i] = static_cast<std::uint16_t>(places.open[i] | (row & cores.open[i] & ~places.known[i]));
     passable[i] = static_cast<std::uint16_t>(row | places.known[i] | places.open[i]);
+    places.doubtful[i] =
+        static_cast<std::uint16_t>(row & sure_cores.open[i] & ~places.known[i] & ~places.open[i]);
   }
   return passable;
 }

@@ -11,15 +11,15 @@ namespace {
 constexpr double kCost_m = 0.01;  // of costs
 constexpr std::uint32_t kNodesPerPoll = 256;
 constexpr double kDoubtful = 4.0;  // times as dear as what is unknown
-// After so many looks what is unknown costs twice as much, after twice as many five times.
-constexpr double kWaits = 16.0;
+// Where the vehicle stood so long, what is unknown costs twice as much, after twice as long five times.
+constexpr Nanos kWaits{1'600'000'000};
 constexpr std::uint32_t kBeyond = 3000;  // units of cost that the search runs on beyond the vehicle
 
 }  // namespace
 
 double WayMemory::price(std::uint32_t position, unsigned room) const noexcept {
   if (is_known_room(room)) return 1.0;
-  const double waits = position_[position].waits / kWaits;
+  const double waits = static_cast<double>(position_[position].waited) / (kWaits / kWaitUnit);
   const double unknown = kUnknownWeight * (1.0 + waits * waits);
   return is_doubtful_room(room) ? kDoubtful * unknown : unknown;
 }

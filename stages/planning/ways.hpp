@@ -7,6 +7,7 @@
 #include "core/executive/stage_budget.hpp"
 #include "core/geometry/vector.hpp"
 #include "firmware_if/status.hpp"
+#include "firmware_if/time.hpp"
 #include "stages/perception/map_view.hpp"
 
 namespace roborun::stages {
@@ -14,15 +15,22 @@ namespace roborun::stages {
 /// A metre of space that nobody has seen yet counts as this many metres of known path: it may hide a detour.
 inline constexpr double kUnknownWeight = 2.0;
 
+/// Where and when the vehicle looks.
+struct WayLook {
+  MonotonicTime now{};
+  Vector3 from_W = Vector3::Zero();
+  double reach_m{};
+};
+
 /// Nothing of it is taken unchecked: planners look at the map before they follow a way. In each decision look(), then solve().
 /// Calls end with their budget and count their work, which the planner's stage is charged for.
 class Ways {
  public:
   virtual ~Ways() = default;
 
-  /// Reads what the map knows now within `reach_m` of a place. kOk or kBudgetSpent: the rest stays as it was.
-  [[nodiscard]] virtual Status look(const MapView& map, const Vector3& p_W, double reach_m,
-                                    core::StageBudget& budget, core::Work& work) noexcept = 0;
+  /// Reads what the map knows now within reach of the vehicle. kOk or kBudgetSpent: the rest stays as it was.
+  [[nodiscard]] virtual Status look(const MapView& map, const WayLook& look, core::StageBudget& budget,
+                                    core::Work& work) noexcept = 0;
   /// The ways to the goal from everywhere that is not farther from it than the vehicle. kOk; kNoPath: there is none, and
   /// it is proved: cells that are occupied stand between both; kInfeasible: none with the room that is planned with, but
   /// there may be one that is narrower than that, or than cells tell, and none of it is worth a closer look; kStartBlocked, kGoalBlocked: no place of the vehicle

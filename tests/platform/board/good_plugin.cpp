@@ -43,7 +43,7 @@ class Map final : public stages::OccupancyMap, stages::MapView {
 class Ways final : public stages::Ways {
  public:
   explicit Ways(const PartRequest& request) : room_m_(request.room_m) {}
-  [[nodiscard]] Status look(const stages::MapView&, const Vector3&, double, core::StageBudget&,
+  [[nodiscard]] Status look(const stages::MapView&, const stages::WayLook&, core::StageBudget&,
                             core::Work&) noexcept override {
     return Status::kOk;
   }

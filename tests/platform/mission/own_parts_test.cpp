@@ -47,9 +47,9 @@ class PassingWays final : public stages::Ways {
         arena_(block_),
         memory_(config, arena_),
         solved_(solved) {}
-  [[nodiscard]] Status look(const stages::MapView& map, const Vector3& p_W, double reach_m,
+  [[nodiscard]] Status look(const stages::MapView& map, const stages::WayLook& look,
                             core::StageBudget& budget, core::Work& work) noexcept override {
-    return memory_.look(map, p_W, reach_m, budget, work);
+    return memory_.look(map, look, budget, work);
   }
   [[nodiscard]] Status solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
                              core::Work& work) noexcept override {

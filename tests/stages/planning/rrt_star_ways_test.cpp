@@ -24,9 +24,9 @@ class Lookups final : public core::StageBudget {
 class ToldShort final : public Ways {
  public:
   explicit ToldShort(Ways& ways) : ways_(ways) {}
-  [[nodiscard]] Status look(const MapView& map, const Vector3& p_W, double reach_m, core::StageBudget& budget,
+  [[nodiscard]] Status look(const MapView& map, const WayLook& look, core::StageBudget& budget,
                             core::Work& work) noexcept override {
-    return ways_.look(map, p_W, reach_m, budget, work);
+    return ways_.look(map, look, budget, work);
   }
   [[nodiscard]] Status solve(const Vector3& from_W, const Vector3& goal_W, core::StageBudget& budget,
                              core::Work& work) noexcept override {
@@ -70,7 +70,7 @@ class KnownWays : public ::testing::Test {
     ways_ = std::make_unique<WayMemory>(config, ways_arena);
     core::UnlimitedBudget unlimited;
     core::Work work;
-    EXPECT_EQ(ways_->look(view_, request_.start_W, 26.0, unlimited, work), Status::kOk);
+    EXPECT_EQ(ways_->look(view_, {{}, request_.start_W, 26.0}, unlimited, work), Status::kOk);
     EXPECT_EQ(ways_->solve(request_.start_W, request_.goal_W, unlimited, work), Status::kOk);
     request_.ways = ways_.get();
   }

@@ -33,7 +33,7 @@ class WayMemoryTest : public ::testing::Test {
     ASSERT_FALSE(arena_->exhausted());
   }
   Status look_and_solve(const Vector3& from_W) {
-    EXPECT_EQ(sut_->look(view_, from_W, 26.0, unlimited_, work_), Status::kOk);
+    EXPECT_EQ(sut_->look(view_, {now_, from_W, 26.0}, unlimited_, work_), Status::kOk);
     return sut_->solve(from_W, goal_W_, unlimited_, work_);
   }
   Vector3 last_known(const Vector3& from_W, double within_m = 100.0) {
@@ -54,6 +54,7 @@ class WayMemoryTest : public ::testing::Test {
     view_.occupied.push_back({Vector3(x0, y0, 0), Vector3(x1, y1, 20)});
   }
   WayMemory::Config config_;
+  MonotonicTime now_{};
   test::BoxView view_;
   std::vector<std::byte> block_;
   std::optional<core::Arena> arena_;
@@ -214,6 +215,23 @@ TEST_F(WayMemoryTest, WhereASurfaceIsAboutItGoesOnlyIfThereIsNoOtherWay) {
   EXPECT_LT(last_known(start_W_).x(), 20.0) << "and no farther";
 }
 
+TEST_F(WayMemoryTest, ACrackInWhichASurfaceIsAboutIsLookedAt) {
+  // Only the middle of the vehicle fits in: too narrow to be planned with, and no proof while nobody knows what is there.
+  config_.body_m = 0.6;
+  box(-15, 20, 20.6, 20.6);
+  box(-15, -20.6, 20.6, -20);
+  box(-15.6, -21, -15, 21);
+  box(20, -21, 20.6, -0.4);
+  box(20, 0.4, 20.6, 21);
+  view_.vague.push_back({Vector3(20, -0.4, 0), Vector3(20.6, 0.4, 20)});
+  make();
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  EXPECT_GT(last_known(start_W_).x(), 17.0) << "goes there to look closely";
+  EXPECT_LT(last_known(start_W_).x(), 20.0) << "and no farther";
+  box(20, -0.4, 20.6, 0.4);
+  EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath) << "it turned out to be closed";
+}
+
 TEST_F(WayMemoryTest, AHoleInAWallThatNobodySawIsAWayUntilItIsSeenToBeTooNarrow) {
   // Two cells of a wall: what surely fits inside the vehicle, which plans with six.
   config_.body_m = 0.6;
@@ -241,8 +259,8 @@ TEST_F(WayMemoryTest, AFenceThatClosesEverythingIsAProof) {
   box(-15.6, -41, -15, 41);
   view_.free_W = {Vector3(-25, -45, 0), Vector3(25, 45, 12)};
   make();
-  EXPECT_EQ(sut_->look(view_, Vector3(0, 25, 5), 26.0, unlimited_, work_), Status::kOk);
-  EXPECT_EQ(sut_->look(view_, Vector3(0, -25, 5), 26.0, unlimited_, work_), Status::kOk);
+  EXPECT_EQ(sut_->look(view_, {now_, Vector3(0, 25, 5), 26.0}, unlimited_, work_), Status::kOk);
+  EXPECT_EQ(sut_->look(view_, {now_, Vector3(0, -25, 5), 26.0}, unlimited_, work_), Status::kOk);
   EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath);
 }
 
@@ -273,7 +291,7 @@ TEST_F(WayMemoryTest, RemembersWhatTheMapGaveUp) {
   view_ = {};
   view_.free_W = {Vector3(-25, -25, 0), Vector3(-15, 25, 12)};
   const Vector3 away_W(-18, -12, 5);
-  ASSERT_EQ(sut_->look(view_, away_W, 4.0, unlimited_, work_), Status::kOk);
+  ASSERT_EQ(sut_->look(view_, {now_, away_W, 4.0}, unlimited_, work_), Status::kOk);
   const Vector3 deep_W(15, 0, 5);
   ASSERT_EQ(sut_->solve(deep_W, goal_W_, unlimited_, work_), Status::kOk);
   EXPECT_GT(sut_->to_goal_m(deep_W), sut_->to_goal_m(start_W_) + 10.0) << "the dead end is still one";
@@ -289,7 +307,8 @@ TEST_F(WayMemoryTest, AGoalInsideAnObstacleIsAnswered) {
 TEST_F(WayMemoryTest, NotFiniteIsRefused) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   make();
-  EXPECT_EQ(sut_->look(view_, Vector3(kNaN, 0, 0), 10.0, unlimited_, work_), Status::kInvalidArgument);
+  EXPECT_EQ(sut_->look(view_, {now_, Vector3(kNaN, 0, 0), 10.0}, unlimited_, work_),
+            Status::kInvalidArgument);
   ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
   EXPECT_EQ(sut_->solve(Vector3(kNaN, 0, 0), goal_W_, unlimited_, work_), Status::kStartBlocked);
   EXPECT_EQ(sut_->to_goal_m(Vector3(kNaN, 0, 0)), kInfinity);
@@ -301,17 +320,34 @@ TEST_F(WayMemoryTest, EndsWithItsBudget) {
     [[nodiscard]] bool spent(const core::Work& done) noexcept override { return done.units > 100; }
   } little;
   make();
-  EXPECT_EQ(sut_->look(view_, start_W_, 26.0, little, work_), Status::kBudgetSpent);
+  EXPECT_EQ(sut_->look(view_, {now_, start_W_, 26.0}, little, work_), Status::kBudgetSpent);
 }
 
 TEST_F(WayMemoryTest, ALookReadsNothingBeyondItsReach) {
   make();
-  ASSERT_EQ(sut_->look(view_, start_W_, 4.0, unlimited_, work_), Status::kOk);
+  ASSERT_EQ(sut_->look(view_, {now_, start_W_, 4.0}, unlimited_, work_), Status::kOk);
   ASSERT_EQ(sut_->solve(start_W_, goal_W_, unlimited_, work_), Status::kOk);
   const double near_m = sut_->to_goal_m(start_W_);
   ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
   // Some 15 m more of the way are known to be free, and count once instead of twice.
   EXPECT_GT(near_m, sut_->to_goal_m(start_W_) + 10.0);
+}
+
+/// What is unknown where it stands becomes dear: by how long it stands, not by how often it looks.
+TEST_F(WayMemoryTest, WhereItStandsTheUnknownBecomesDearWithTime) {
+  view_.free_W = {Vector3(-25, -25, 0), Vector3(5, 25, 12)};  // unknown from 5 m ahead on
+  const auto stand = [&](int looks, Nanos between) {
+    make();
+    for (int i = 0; i <= looks; ++i, now_ += between) EXPECT_EQ(look_and_solve(start_W_), Status::kOk);
+    return sut_->to_goal_m(start_W_);
+  };
+  using std::chrono::milliseconds;
+  const double at_once_m = stand(0, milliseconds(0));
+  const double often_m = stand(100, milliseconds(40)), seldom_m = stand(1, milliseconds(4000));
+  EXPECT_GT(seldom_m, at_once_m + 5.0);
+  EXPECT_NEAR(seldom_m, often_m, 0.01);
+  EXPECT_EQ(stand(100, milliseconds(0)), at_once_m);
+  EXPECT_EQ(stand(1, milliseconds(20'000)), stand(30, milliseconds(1000))) << "after 12.8 s no more";
 }
 
 TEST_F(WayMemoryTest, ALookForgetsWhatHasChangedAndKeepsTheRest) {
@@ -340,7 +376,7 @@ TEST_F(WayMemoryTest, WhatChangesAllTheTimeHidesNothingElse) {
   const auto look = [&](int most) {
     polls.most = most;
     polls.count_ = 0;
-    return sut_->look(view_, start_W_, kReach_m, polls, work_);
+    return sut_->look(view_, {now_, start_W_, kReach_m}, polls, work_);
   };
   const auto to_goal_m = [&] {
     EXPECT_EQ(sut_->solve(start_W_, goal_W_, unlimited_, work_), Status::kOk);
