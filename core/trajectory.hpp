@@ -53,6 +53,7 @@ class Trajectory {
   /// A trajectory that stays at a point for ever.
   [[nodiscard]] static Trajectory hold(const Vector3& p_W, MonotonicTime start) noexcept;
   [[nodiscard]] double duration_s() const noexcept;
+  [[nodiscard]] MonotonicTime ends() const noexcept { return start_time + from_seconds(duration_s()); }
   [[nodiscard]] Vector3 end_W() const noexcept;
   /// RT-safe: O(segment_count), no allocation.
   [[nodiscard]] TrajectoryPoint at(MonotonicTime time) const noexcept;

@@ -164,7 +164,7 @@ void DecisionPipeline::govern(const DecisionInput& in, DecisionOutput& out) noex
 }
 
 Vector3 DecisionPipeline::assumed_half_m(const DecisionInput& in) const noexcept {
-  const MonotonicTime climbed = in.committed->start_time + from_seconds(in.committed->duration_s());
+  const MonotonicTime climbed = in.committed->ends();
   // Decisions that are long may all begin before or after the short hover of the climb: until there is a plan,
   // the vehicle hovers where the climb ended.
   const bool hovers = in.now >= climbed && (in.climbing || !has_planned_);
@@ -312,7 +312,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
   draft_.begun = false;
   hasten(in, out);
   draft_.takes_over = in.now + out.decision.point.deadline;
-  const MonotonicTime ends = in.committed->start_time + from_seconds(in.committed->duration_s());
+  const MonotonicTime ends = in.committed->ends();
   if (in.climbing && draft_.takes_over < ends) return;
   if (in.now < back_until_) {
     out.planner_status = out.smoother_status = Status::kOk;  // of what is flown

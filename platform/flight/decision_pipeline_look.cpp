@@ -87,7 +87,7 @@ void DecisionPipeline::look_on(const DecisionInput& in, core::StageBudget& budge
   if (out.planner_status != Status::kBudgetSpent) looks_next_.reset();
   if (out.planner_status == Status::kOk) fit(budget, radius, kSlowly_mps, out);
   if (out.smoother_status == Status::kOk)
-    back_until_ = draft_.trajectory.start_time + from_seconds(draft_.trajectory.duration_s()) + kSettles;
+    back_until_ = draft_.trajectory.ends() + kSettles;
   else
     out.planner_status = planned;
   kept_W_.clear();

@@ -76,7 +76,7 @@ void DecisionPipeline::slow_down(const DecisionInput& in, const stages::MapView&
   if (draft_.stops || (is_found && !draft_.keeps && !is_kept(in, out))) return;
   const Trajectory found = draft_.trajectory;
   const stages::Path path_W = kept_W_;
-  const MonotonicTime ends = in.committed->start_time + from_seconds(in.committed->duration_s());
+  const MonotonicTime ends = in.committed->ends();
   kept_W_.clear();
   for (MonotonicTime t = draft_.takes_over; t < ends && kept_W_.size() + 1 < kept_W_.capacity(); t += kEvery)
     (void)kept_W_.push_back(in.committed->at(t).p_W);
@@ -108,7 +108,7 @@ void DecisionPipeline::hasten(const DecisionInput& in, DecisionOutput& out) cons
                         out.decision.predicted_s[core::StageId::kSmoother];
   const Nanos needed = out.latency + from_seconds(kReserve * left_s);
   const Nanos whole = config_.minor_frame * (needed / config_.minor_frame + kSpareFrames);
-  const MonotonicTime stands = in.committed->start_time + from_seconds(in.committed->duration_s());
+  const MonotonicTime stands = in.committed->ends();
   if (in.now + whole < stands) return;
   out.decision.point.deadline = std::min(out.decision.point.deadline, whole);
 }

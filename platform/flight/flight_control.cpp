@@ -169,9 +169,7 @@ void FlightControl::commit(MonotonicTime now) {
     home_W_ = committed_.end_W() + state.shift_W;
     ground_m_ = stood_m_.value_or(state.p_WB.z());
   }
-  if (!airborne_ && now > committed_.start_time + from_seconds(committed_.duration_s()) + kHover &&
-      gaze_.ready())
-    airborne_ = true;
+  if (!airborne_ && now > committed_.ends() + kHover && gaze_.ready()) airborne_ = true;
   if (braking_ || descending_ || !gaze_.ready()) offered_.reset();
   if (offered_ && offered_->start_time <= now) {
     committed_ = *offered_;
@@ -191,9 +189,8 @@ void FlightControl::brake() {
 
 bool FlightControl::standing(MonotonicTime now) const {
   stages::EstimatedState state;
-  return flying_ && !braking_ && now > committed_.start_time + from_seconds(committed_.duration_s()) &&
-         estimator_.state(state) == Status::kOk && state.v_WB.norm() < kStand_mps &&
-         (state.p_WB - reference_.p_W).norm() < kStand_m;
+  return flying_ && !braking_ && now > committed_.ends() && estimator_.state(state) == Status::kOk &&
+         state.v_WB.norm() < kStand_mps && (state.p_WB - reference_.p_W).norm() < kStand_m;
 }
 
 void FlightControl::descend(MonotonicTime now, double speed_mps) {

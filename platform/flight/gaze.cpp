@@ -22,7 +22,7 @@ void Gaze::turn_to(double target_rad) noexcept {
 
 double Gaze::step(const Input& in) noexcept {
   if (!config_.follows) return yaw_rad_;
-  const MonotonicTime ends = in.committed.start_time + from_seconds(in.committed.duration_s());
+  const MonotonicTime ends = in.committed.ends();
   if (!ready_) {
     if (in.now < ends) return yaw_rad_;  // still climbing
     turn_on();

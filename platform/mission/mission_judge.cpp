@@ -163,8 +163,7 @@ const char* MissionJudge::judge(MonotonicTime now) {
   }
   // Given up: no more decisions; the committed trajectory ends in a stop, and the mission in a hover.
   const Trajectory& committed = system_.control().committed();
-  const bool stopped =
-      now > committed.start_time + from_seconds(committed.duration_s()) && s.v_WB.norm() < kHover_mps;
+  const bool stopped = now > committed.ends() && s.v_WB.norm() < kHover_mps;
   const bool helpless = seconds(now.time_since_epoch()) > config_.time_limit_s + kGiveUpAfter_s;
   return stopped || helpless ? give_up_ : nullptr;
 }

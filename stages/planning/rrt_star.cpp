@@ -34,6 +34,14 @@ bool leads_on(const PlanRequest& request, const Vector3& target_W) noexcept {
   return saved_m >= 0.5 * (target_W - request.start_W).norm();
 }
 
+/// False if a path to the goal in known space would have to wind: it is no shorter than the ways are. A search for one that is
+/// not there takes all the time there is.
+bool may_be_known(const PlanRequest& request) noexcept {
+  constexpr double kMostHorizons = 4.0;
+  const double way_m = request.ways != nullptr ? request.ways->to_goal_m(request.start_W) : 0.0;
+  return way_m <= kMostHorizons * request.horizon_m || std::isinf(way_m);
+}
+
 using Samples = core::StaticVector<Vector3, 2 * kMaxWaypoints>;
 
 /// Points along a path inside the bounds, none farther than a step from the one before.
@@ -274,7 +282,7 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
   const Vector3 target_W = towards_goal(request);
   const double to_target_m = (target_W - request.start_W).norm();
   // 1. The goal is known free space: a path that ends there.
-  if (to_target_m > kShortEdge_m && target_W == request.goal_W && !goal_bad &&
+  if (to_target_m > kShortEdge_m && target_W == request.goal_W && !goal_bad && may_be_known(request) &&
       is_ball_free(view, target_W, request.radius_m, work.units)) {
     const Status status = connect(s, result);
     if (status != Status::kNoPath) return status;

@@ -121,6 +121,24 @@ TEST_F(KnownWays, ThatWindMoreThanTheirLengthTellsAreFollowedWhereNothingElseLea
   }
 }
 
+TEST_F(KnownWays, LeadAroundAWallBehindWhichTheGoalIsSeen) {
+  // The goal is known to be free, 4.6 m away, and 40 m to fly: a search for a path straight to it takes all the time there is.
+  view_.occupied = {{Vector3(2, -26, 0), Vector3(2.6, 17, 20)}};
+  request_.goal_W = Vector3(4.6, 0, 5);
+  request_.horizon_m = 6.0;
+  core::UnlimitedBudget unlimited;
+  core::Work work;
+  ways_->forget();
+  ASSERT_EQ(ways_->look(view_, {{}, request_.start_W, 26.0}, unlimited, work), Status::kOk);
+  ASSERT_EQ(ways_->solve(request_.start_W, request_.goal_W, unlimited, work), Status::kOk);
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const PlanResult result = plan(seed, 1000000);
+    ASSERT_GE(result.path_W.size(), 2U) << "seed " << seed;
+    EXPECT_GT(result.path_W.back().y(), 5.0) << "towards the end of the wall";
+    EXPECT_LT(result.work.units, 10000U) << "17,000 with a search for it";
+  }
+}
+
 TEST_F(KnownWays, SameRequestSamePath) {
   const PlanResult a = plan(3, 40000), b = plan(3, 40000);
   ASSERT_EQ(a.path_W.size(), b.path_W.size());
