@@ -72,9 +72,9 @@ void DecisionPipeline::look_on(const DecisionInput& in, core::StageBudget& budge
   }
   if (!look_W_) blocked_since_ = std::max(blocked_since_, in.now - kLookAgain + kLookFirst);
   look_W_ = undecided_W(in);
-  meter_.charge_to(core::StageId::kPlanner);
   if (in.now - blocked_since_ >= kLookAgain) {
     blocked_since_ = in.now;
+    meter_.charge_to(core::StageId::kPlanner);
     looks_next_ = find_look(in);
   }
   if (!looks_next_) return;

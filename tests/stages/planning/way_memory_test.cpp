@@ -53,6 +53,15 @@ class WayMemoryTest : public ::testing::Test {
   void box(double x0, double y0, double x1, double y1) {
     view_.occupied.push_back({Vector3(x0, y0, 0), Vector3(x1, y1, 20)});
   }
+  /// A closed room but for two cells of a wall: what surely fits inside the vehicle, which plans with six.
+  void wall_in_but_for_a_crack() {
+    config_.body_m = 0.6;
+    box(-15, 20, 20.6, 20.6);
+    box(-15, -20.6, 20.6, -20);
+    box(-15.6, -21, -15, 21);
+    box(20, -21, 20.6, -0.4);
+    box(20, 0.4, 20.6, 21);
+  }
   WayMemory::Config config_;
   MonotonicTime now_{};
   test::BoxView view_;
@@ -216,13 +225,8 @@ TEST_F(WayMemoryTest, WhereASurfaceIsAboutItGoesOnlyIfThereIsNoOtherWay) {
 }
 
 TEST_F(WayMemoryTest, ACrackInWhichASurfaceIsAboutIsLookedAt) {
-  // Only the middle of the vehicle fits in: too narrow to be planned with, and no proof while nobody knows what is there.
-  config_.body_m = 0.6;
-  box(-15, 20, 20.6, 20.6);
-  box(-15, -20.6, 20.6, -20);
-  box(-15.6, -21, -15, 21);
-  box(20, -21, 20.6, -0.4);
-  box(20, 0.4, 20.6, 21);
+  // Too narrow to be planned with, and no proof while nobody knows what is there.
+  wall_in_but_for_a_crack();
   view_.vague.push_back({Vector3(20, -0.4, 0), Vector3(20.6, 0.4, 20)});
   make();
   ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
@@ -233,13 +237,7 @@ TEST_F(WayMemoryTest, ACrackInWhichASurfaceIsAboutIsLookedAt) {
 }
 
 TEST_F(WayMemoryTest, AHoleInAWallThatNobodySawIsAWayUntilItIsSeenToBeTooNarrow) {
-  // Two cells of a wall: what surely fits inside the vehicle, which plans with six.
-  config_.body_m = 0.6;
-  box(-15, 20, 20.6, 20.6);
-  box(-15, -20.6, 20.6, -20);
-  box(-15.6, -21, -15, 21);
-  box(20, -21, 20.6, -0.4);
-  box(20, 0.4, 20.6, 21);
+  wall_in_but_for_a_crack();
   view_.free_W.max_W.x() = 20.0;
   make();
   ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
