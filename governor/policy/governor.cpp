@@ -235,8 +235,8 @@ double Governor::least_s(const Task& task, int level) const noexcept {
 /// either side of a gap: a gap of width g loses up to four cells, so it is passable for certain on cells of
 ///   (g - width) / 4
 /// and `cells_to_obstacle` cells must fit between the vehicle and the nearest obstacle. Then the policy:
-/// coarser only step by step, finer than 0.3 m only after failures, on narrow ways, and one level where the space asks for less than
-/// 0.6 m and `fine_within` has time for it; at most 0.6 m near the goal and on the climb. Failures ask for one level finer
+/// coarser only step by step, finer than 0.3 m only after failures, on narrow ways, and one level where `longest` has time for
+/// it, or `fine_within` and the space asks for less than 0.6 m; at most 0.6 m near the goal and on the climb. Failures ask for one level finer
 /// each. Where the finest cells take more than twice `fine_within`, they are for ways that are narrow for what stands
 /// there, not for holes of the cameras, and failures begin anew after two at the finest, one with each radius of the planner: where
 /// precision was not what lacked, quick looks fill holes sooner.
@@ -247,8 +247,8 @@ int Governor::asked_level(const Task& task, Decision& d) const noexcept {
   int level = std::min(config_.lattice.coarsest_level_within(d.demand_m), config_.coarsest_level);
   level = std::min(level, last_level_ + policy.coarser_levels_per_decision);
   const int fine = std::max(published_level() - 1, 0);
-  const bool costs_nothing =
-      d.demand_m < 2.0 * kPublishedCell_m && least_s(task, fine) <= seconds(policy.fine_within);
+  const Nanos within = d.demand_m < 2.0 * kPublishedCell_m ? policy.fine_within : policy.longest;
+  const bool costs_nothing = least_s(task, fine) <= seconds(within);
   level = costs_nothing ? fine : std::max(level, published_level());
   const int finer = finer_levels(task.situation);
   const bool cheap = least_s(task, 0) <= 2.0 * seconds(policy.fine_within);

@@ -319,6 +319,7 @@ void DecisionPipeline::plan(const DecisionInput& in, DecisionOutput& out) noexce
     return;
   }
   draft_.begun = true;
+  trail_.note(in.p_WB);
   draft_.start = in.committed->at(draft_.takes_over);
   draft_.planner_work = out.work[core::StageId::kPlanner];
   draft_.smoother_work = {};
@@ -374,6 +375,7 @@ void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noex
     core::MeteredBudget budget = table_budget_of(core::StageId::kSmoother);
     if (!draft_.keeps) find_trajectory(in, budget, out);
     if (config_.turns) look_on(in, budget, out);
+    go_back(in, budget, out);
     give_way(in, budget, out);
     if (config_.stops_straight && !in.climbing) slow_down(in, Known(*this, in).view(), budget, out);
     charge(core::StageId::kPlanner, draft_.planner_work, out);
@@ -382,7 +384,7 @@ void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noex
     charge(core::StageId::kSmoother, draft_.smoother_work, out);
     choose(in, out);
   }
-  out.look_W = look_W_;
+  out.gaze_target = gaze_target_;
   for (std::size_t i = 0; i < core::kStageCount; ++i) {
     const auto stage = static_cast<core::StageId>(i);
     policy_.observe(stage, out.decision.predicted_s[i], seconds(out.cost[i]));
@@ -467,8 +469,9 @@ void DecisionPipeline::forget() noexcept {
   thin_until_ = {};
   thin_from_W_.reset();
   viewpoints_ = {};
+  trail_ = {};
   kept_W_.clear();
-  look_W_.reset();
+  gaze_target_.reset();
   looks_next_.reset();
   left_W_.reset();
   has_planned_ = false;

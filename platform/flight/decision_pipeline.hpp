@@ -19,7 +19,9 @@
 #include "core/vehicle_model.hpp"
 #include "governor/policy/decision_policy.hpp"
 #include "platform/flight/body_tracks.hpp"
+#include "platform/flight/gaze.hpp"
 #include "platform/flight/motion_watch.hpp"
+#include "platform/flight/trail.hpp"
 #include "platform/flight/viewpoints.hpp"
 #include "stages/perception/cloud_images.hpp"
 #include "stages/perception/occupancy_map.hpp"
@@ -86,9 +88,9 @@ struct DecisionOutput {
       Status::kNotReady};  ///< Of Ways::look() or solve(); kNotReady: nothing remembers ways here.
   double
       way_m{};  ///< Length of the way to the goal if ways_status is kOk: what is unknown on it counts kUnknownWeight times.
-  bool motion{};                    ///< Something was seen to move nearby, not long ago.
-  std::optional<Vector3> look_W{};  ///< DecisionReport::look_W.
-  Nanos latency{};                  ///< Sum of the costs: when the result is there, counted from input.now.
+  bool motion{};                            ///< Something was seen to move nearby, not long ago.
+  std::optional<GazeTarget> gaze_target{};  ///< DecisionReport::gaze_target.
+  Nanos latency{};  ///< Sum of the costs: when the result is there, counted from input.now.
 };
 
 /// Runs the stages in the order of the frame table, each under the budget that the governor granted it.
@@ -204,6 +206,9 @@ class DecisionPipeline {
   void squeeze_on(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// From rest, out of where no search has room to where `room_m` is free: slowly, with the vehicle's own radius.
   void leave(double room_m, core::StageBudget& budget, DecisionOutput& out) noexcept;
+  /// The same where it is shut in: what it flew through was free, and looks of later made the surfaces there thicker. Back to where it
+  /// came from, if it is nearer to the goal from there.
+  void go_back(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// Of a vehicle that turns: where no way is found, it looks at what is unknown on the way, and after a while from elsewhere.
   void look_on(const DecisionInput& in, core::StageBudget& budget, DecisionOutput& out) noexcept;
   /// Where the known part of the way to the goal ends.
@@ -261,12 +266,14 @@ class DecisionPipeline {
   MonotonicTime dodges_at_ = MonotonicTime::min();  ///< The same of the last one that goes aside.
   Draft draft_;
   std::array<double, kPrecisionLevels> searched_s_{};  ///< By level of p1: what the planner took lately.
-  std::optional<Vector3> look_W_{};  ///< What it looks at while it stands without a way, or goes to see more.
-  std::optional<Look> looks_next_{};  ///< No path to it was found yet.
-  MonotonicTime blocked_since_{};     ///< Standing without a way, and the looks so far led nowhere.
-  MonotonicTime back_until_{};        ///< It goes to see more: nothing else is planned.
+  std::optional<GazeTarget> gaze_target_{};            ///< Where the known way ends, or what it goes to see.
+  std::optional<Look> looks_next_{};                   ///< No path to it was found yet.
+  MonotonicTime blocked_since_{};  ///< Standing without a way, and the looks so far led nowhere.
+  MonotonicTime back_until_{};     ///< It goes to see more: nothing else is planned.
   Viewpoints viewpoints_;
-  MonotonicTime thin_until_{};            ///< Something thin was seen less than kThinLasts before,
+  Trail trail_;
+  MonotonicTime shut_in_since_{};  ///< It stands, a way is known, and the planner answers that there is none.
+  MonotonicTime thin_until_{};     ///< Something thin was seen less than kThinLasts before,
   std::optional<Vector3> thin_from_W_{};  ///< the last time from here.
   bool is_narrow_{false};                 ///< What is flown was planned so.
   /// The fastest that a plan was lately, of which a straight stop was free everywhere (stops_free()).

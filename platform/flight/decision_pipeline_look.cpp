@@ -18,9 +18,7 @@ constexpr std::uint32_t kThinPixels = 32;
 constexpr Nanos kThinLasts{5'000'000'000};
 constexpr double kThinNear_m = 5.0;
 
-constexpr Nanos kLookFirst{4'000'000'000};   // a half turn at 45 degrees a second
-constexpr Nanos kLookAgain{12'000'000'000};  // the same, and once round
-constexpr Nanos kSettles{500'000'000};       // images of the place where it has stepped back to
+constexpr Nanos kSettles{500'000'000};  // images of the place where it has stepped back to
 constexpr double kStepBack_m = 3.0;
 constexpr double kSlowly_mps = 1.0;
 constexpr double kHere_m = 0.3;  // nearer than that a direction means little
@@ -65,20 +63,23 @@ std::optional<DecisionPipeline::Look> DecisionPipeline::find_look(const Decision
 void DecisionPipeline::look_on(const DecisionInput& in, core::StageBudget& budget,
                                DecisionOutput& out) noexcept {
   const bool stands = draft_.start.v_W.norm() <= kAtRest_mps && !in.climbing;
-  if (out.smoother_status == Status::kOk || !stands) {
-    look_W_.reset();
+  const bool was_blocked = gaze_target_ && !gaze_target_->aside;
+  gaze_target_ = GazeTarget{undecided_W(in), out.smoother_status == Status::kOk || !stands};
+  if (gaze_target_->aside) {
     looks_next_.reset();
     return;
   }
-  if (!look_W_) blocked_since_ = std::max(blocked_since_, in.now - kLookAgain + kLookFirst);
-  look_W_ = undecided_W(in);
-  if (in.now - blocked_since_ >= kLookAgain) {
+  // Time for half a turn, then for that and once round.
+  const Nanos look_first = from_seconds(core::kPi / config_.vehicle.yaw_rate_radps);
+  const Nanos look_again = 3 * look_first;
+  if (!was_blocked) blocked_since_ = std::max(blocked_since_, in.now - look_again + look_first);
+  if (in.now - blocked_since_ >= look_again) {
     blocked_since_ = in.now;
     meter_.charge_to(core::StageId::kPlanner);
     looks_next_ = find_look(in);
   }
   if (!looks_next_) return;
-  look_W_ = looks_next_->at_W;
+  gaze_target_->at_W = looks_next_->at_W;
   const double radius = slow_radius_m(config_.vehicle);
   const Status planned = out.planner_status;
   draft_.planner_work.volume_m3 = 0.0;

@@ -4,11 +4,18 @@
 
 #include "platform/flight/decision_pipeline.hpp"
 #include "platform/flight/flight_config.hpp"
+#include "stages/perception/polled_view.hpp"
 #include "stages/perception/swept_ball.hpp"
 #include "stages/planning/fenced_view.hpp"
 #include "stages/planning/way_out.hpp"
 
 namespace roborun::flight {
+namespace {
+
+constexpr double kLeaving_mps = 0.5;
+constexpr Nanos kShutIn{5'000'000'000};  // searches with all time and with either room found nothing
+
+}  // namespace
 
 bool DecisionPipeline::stops_free(const Trajectory& trajectory, MonotonicTime from, const DecisionOutput& out,
                                   const stages::MapView& view, core::Work& work) const noexcept {
@@ -114,7 +121,6 @@ void DecisionPipeline::hasten(const DecisionInput& in, DecisionOutput& out) cons
 }
 
 void DecisionPipeline::leave(double room_m, core::StageBudget& budget, DecisionOutput& out) noexcept {
-  constexpr double kLeaving_mps = 0.5;
   constexpr double kSamePlace_m = 2.0;  // as far as a way out leads
   constexpr int kTriesFiner = 4;        // failures: the governor asks for finer cells meanwhile
   // What is flown ends in a stop: from there.
@@ -137,6 +143,34 @@ void DecisionPipeline::leave(double room_m, core::StageBudget& budget, DecisionO
   draft_.leaves =
       stages::find_way_out(request, permitted, finest, budget, draft_.smoother_work, draft_.trajectory);
   out.smoother_status = draft_.leaves ? Status::kOk : Status::kNoPath;
+}
+
+void DecisionPipeline::go_back(const DecisionInput& in, core::StageBudget& budget,
+                               DecisionOutput& out) noexcept {
+  const Vector3& from_W = draft_.start.p_W;
+  const bool stands = draft_.start.v_W.norm() <= kAtRest_mps && !in.climbing;
+  if (out.planner_status != Status::kNoPath || !stands || !ways_known_) shut_in_since_ = in.now;
+  if (in.now - shut_in_since_ < kShutIn) return;
+  meter_.charge_to(core::StageId::kSmoother);
+  core::Work& work = draft_.smoother_work;
+  const stages::FencedView permitted(map_.view(), config_.fence);
+  const stages::FinestView finest(permitted);
+  const stages::PolledView view(finest, budget, work);
+  const double nearer_m = ways_->to_goal_m(from_W) - view.cell_m();
+  for (std::size_t i = 0; i < trail_.size() && !view.spent(); ++i) {
+    const Vector3& to_W = trail_.back(i);
+    Trajectory line;
+    line.start_time = draft_.takes_over;
+    if (!(ways_->to_goal_m(to_W) < nearer_m) || !config_.flight_bounds_W.contains(to_W) ||
+        !stages::is_ball_free(view, to_W, slow_radius_m(config_.vehicle), work.units) ||
+        !stages::append_rest_to_rest(from_W, to_W, limits(kLeaving_mps), line) ||
+        !stages::is_trajectory_free(view, line, 0.0, config_.vehicle.radius_m, work.units))
+      continue;
+    draft_.trajectory = line;
+    draft_.leaves = true;
+    out.smoother_status = Status::kOk;
+    return;
+  }
 }
 
 }  // namespace roborun::flight

@@ -301,7 +301,7 @@ void DecisionProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
   if (slot == SlotId::kMap && out_.early_stop && hand_over(*out_.early_stop, true, lane))
     in_.committed = &handed_over_;
   if (slot == SlotId::kSmoother) {
-    report_.look_W = out_.look_W;
+    report_.gaze_target = out_.gaze_target;
     judge();
   }
   if (slot == SlotId::kGovernor || slot == SlotId::kSmoother)

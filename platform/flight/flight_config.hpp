@@ -21,7 +21,7 @@ namespace roborun::flight {
 /// For vehicles that do not see all around: the yaw follows where they will fly.
 struct GazeConfig {
   bool follows{false};         ///< False: the yaw of the take-off is kept.
-  double yaw_rate_radps{0.8};  ///< (0, 3]. Images of 30 ms blur by less than two pixels of 640.
+  double yaw_rate_radps{3.0};  ///< (0, 3]. The vehicle turns no faster than its own.
   double stuck_s{3.0};         ///< Hovering for so long without a new trajectory: it looks round.
   double lead_s{0.7};          ///< Looks where the trajectory goes so much later.
 };

@@ -261,7 +261,7 @@ void FlightControl::track(MonotonicTime now, firmware_if::Autopilot& autopilot) 
   if (landed_ || estimator_.state(state) != Status::kOk) return;
   if (flying_) {
     reference_ = next_reference(now);
-    if (!descending_) yaw_rad_ = gaze_.step({now, committed_, committed_number_, look_W_});
+    if (!descending_) yaw_rad_ = gaze_.step({now, committed_, committed_number_, gaze_target_});
   } else {
     reference_ = {};
     reference_.p_W = state.p_WB;
@@ -282,7 +282,7 @@ void FlightControl::track(MonotonicTime now, firmware_if::Motors& motors) {
   if (!flying_ || landed_ || estimator_.state(in.state) != Status::kOk) return;
   reference_ = next_reference(now);
   in.reference = reference_;
-  if (!descending_) yaw_rad_ = gaze_.step({now, committed_, committed_number_, look_W_});
+  if (!descending_) yaw_rad_ = gaze_.step({now, committed_, committed_number_, gaze_target_});
   in.yaw_rad = yaw_rad_;
   // A refused step leaves the command of the frame before.
   (void)tracker_.step(in, command_);

@@ -45,8 +45,8 @@ class FlightControl {
   void allow_take_off(bool allowed) { may_take_off_ = allowed; }
   /// A trajectory that takes over at its start time. The last one offered counts.
   void offer(const Trajectory& trajectory) { offered_ = trajectory; }
-  /// For a vehicle that does not see all around: what it is to look at; none: where it flies.
-  void look_at(const std::optional<Vector3>& look_W) { look_W_ = look_W; }
+  /// For a vehicle that does not see all around: where it looks; none: where it flies.
+  void look_at(const std::optional<GazeTarget>& target) { gaze_target_ = target; }
   /// The three steps of a minor frame, in this order. RT-safe: O(1), no allocation.
   /// Reads all sensors, at most a ring's worth each, and estimates.
   void sense(firmware_if::Imu& imu, firmware_if::Gnss& gnss, firmware_if::Barometer& barometer,
@@ -130,7 +130,7 @@ class FlightControl {
   bool airborne_{false};
   Gaze gaze_;
   double yaw_rad_{0.0};
-  std::optional<Vector3> look_W_;
+  std::optional<GazeTarget> gaze_target_;
   bool may_take_off_{true};
 
   std::optional<firmware_if::AutopilotReport> autopilot_;  ///< None: there is no autopilot.

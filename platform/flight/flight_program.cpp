@@ -31,7 +31,7 @@ void FlightProgram::run(SlotId slot, core::LaneExecutive& lane) noexcept {
     case SlotId::kCommit:
       (void)mail_.decision.take();
       pilot_.guard(now, mail_.decision.read());
-      control_.look_at(mail_.decision.read().look_W);
+      control_.look_at(mail_.decision.read().gaze_target);
       take_offers(now, lane);
       control_.commit(now);
       return;

@@ -7,8 +7,9 @@
 namespace roborun::flight {
 namespace {
 
-constexpr double kMoves_mps = 0.3;  // slower than that a direction means little
-constexpr double kBeside_m = 0.3;   // the same of a place
+constexpr double kMoves_mps = 0.3;   // slower than that a direction means little
+constexpr double kBeside_m = 0.3;    // the same of a place
+constexpr double kAside_rad = 0.25;  // what is ahead stays in the view of a narrow camera (62 degrees), too
 
 }  // namespace
 
@@ -24,10 +25,12 @@ double Gaze::step(const Input& in) noexcept {
   if (!config_.follows) return yaw_rad_;
   const MonotonicTime ends = in.committed.ends();
   if (!ready_) {
-    if (in.now < ends) return yaw_rad_;  // still climbing
-    turn_on();
-    turned_rad_ += period_s_ * config_.yaw_rate_radps;
-    ready_ = turned_rad_ >= 2.0 * core::kPi;
+    const bool turned = turned_rad_ >= 2.0 * core::kPi;
+    if (!turned) {
+      turn_on();
+      turned_rad_ += period_s_ * config_.yaw_rate_radps;
+    }
+    ready_ = turned && in.now >= ends;
     still_since_ = in.now;
     return yaw_rad_;
   }
@@ -36,11 +39,16 @@ double Gaze::step(const Input& in) noexcept {
   if (moves || in.committed_number != number_ || in.now < ends) still_since_ = in.now;
   number_ = in.committed_number;
   const bool stuck = in.now - still_since_ >= from_seconds(config_.stuck_s);
-  const Vector3 look_W = in.look_W ? Vector3(*in.look_W - in.committed.at(in.now).p_W) : Vector3::Zero();
-  if (!stuck && core::hypot2(look_W.x(), look_W.y()) > kBeside_m) {
-    turn_to(core::atan2(look_W.y(), look_W.x()));
+  const Vector3 look_W = in.target ? Vector3(in.target->at_W - in.committed.at(in.now).p_W) : Vector3::Zero();
+  const bool looks = !stuck && core::hypot2(look_W.x(), look_W.y()) > kBeside_m;
+  const double look_rad = core::atan2(look_W.y(), look_W.x());
+  const double flies_rad = core::atan2(v_W.y(), v_W.x());
+  if (looks && !(moves && in.target->aside)) {
+    turn_to(look_rad);
   } else if (moves) {
-    turn_to(core::atan2(v_W.y(), v_W.x()));
+    const double aside_rad =
+        looks ? std::clamp(core::wrap_angle(look_rad - flies_rad), -kAside_rad, kAside_rad) : 0.0;
+    turn_to(core::wrap_angle(flies_rad + aside_rad));
   } else if (stuck) {
     turn_on();
   }

@@ -11,13 +11,19 @@
 
 namespace roborun::flight {
 
+struct GazeTarget {
+  Vector3 at_W = Vector3::Zero();
+  /// Where it flies is what counts, and this is seen aside of it; false: this is what it has to see, until it is stuck.
+  bool aside{};
+};
+
 class Gaze {
  public:
   struct Input {
     MonotonicTime now{};
     const Trajectory& committed;
     std::uint64_t committed_number{};  ///< Another one for each trajectory.
-    std::optional<Vector3> look_W{};   ///< What it is to see, until it is stuck.
+    std::optional<GazeTarget> target{};
   };
   Gaze(const GazeConfig& config, double period_s) noexcept : config_(config), period_s_(period_s) {}
 

@@ -8,6 +8,7 @@
 #include "core/trajectory.hpp"
 #include "firmware_if/time.hpp"
 #include "governor/failsafe/arbiter.hpp"
+#include "platform/flight/gaze.hpp"
 #include "stages/control/estimator.hpp"
 #include "stages/perception/frame_guard.hpp"
 
@@ -50,8 +51,8 @@ struct DecisionReport {
   int map_refusals{};  ///< Decisions in a row in which the map refused bricks.
   bool site_known{false};
   Vector3 site_W = Vector3::Zero();  ///< Below it everything is known to be free.
-  /// What decides about the way is to be seen there, and no way was found without it.
-  std::optional<Vector3> look_W{};
+  /// What decides about the way is to be seen there: aside of the flight, or no way was found without it.
+  std::optional<GazeTarget> gaze_target{};
 };
 
 struct LaneMail {

@@ -15,7 +15,7 @@ constexpr std::int32_t kWindow = 13, kWindowHeight = 9;  // blocks of one look, 
 constexpr std::size_t kWindowBlocks =
     static_cast<std::size_t>(kWindow + 1) * (kWindow + 1) * (kWindowHeight + 1);
 constexpr double kStands_m = 0.3;  // from one look to the next
-constexpr Nanos kMostWaited{12'800'000'000};
+constexpr Nanos kMostWaited{60'000'000'000};
 constexpr std::uint64_t kWorkOfABlock = 64;  // lookups that a block that changed counts as
 
 std::int32_t whole(double x) noexcept { return static_cast<std::int32_t>(std::floor(x)); }

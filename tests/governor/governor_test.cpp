@@ -278,7 +278,7 @@ TEST(Governor, FailuresGoThroughTheLevelsAgainAndAgain) {
 }
 
 /// Between trees, gaps of 3.4 m on the average (asked for: 0.45 m): on a board that has time for them, cells of 0.15 m.
-TEST(Governor, TakesFinerCellsWhereItIsTightAndTheyCostNothing) {
+TEST(Governor, TakesFinerCellsWhereTheyCostNothingAndWhereItIsTightAndTheyCostLittle) {
   GovernorConfig config = paper_config(Design::kAware);
   config.lattice = {0.15};
   const core::CostProfile costs = core::on_lattice(core::paper_profile(), config.lattice);
@@ -294,7 +294,9 @@ TEST(Governor, TakesFinerCellsWhereItIsTightAndTheyCostNothing) {
   };
   const double tight_m = config.vehicle_width_m + 4 * 0.45, wide_m = config.vehicle_width_m + 4 * 0.65;
   EXPECT_EQ(on_board(0.005, tight_m), 0);
-  EXPECT_GE(on_board(0.005, wide_m), 1);
+  EXPECT_EQ(on_board(0.005, wide_m), 0);
+  EXPECT_EQ(on_board(0.06, tight_m), 0) << "longer than the longest decision, shorter than `fine_within`";
+  EXPECT_GE(on_board(0.06, wide_m), 1);
   EXPECT_GE(on_board(0.5, tight_m), 1);
 }
 

@@ -65,7 +65,7 @@ TEST_F(RigFlight, OneFrontCameraReachesTheGoal) {
   EXPECT_FALSE(r.collided);
   EXPECT_TRUE(r.reached_goal) << r.reason;
   EXPECT_GT(most_turn_radps, 0.5) << "it looks round";
-  EXPECT_LT(most_turn_radps, 1.6) << "not faster than it is told";
+  EXPECT_LT(most_turn_radps, 1.5 * config_.flight.vehicle.yaw_rate_radps) << "not faster than it is told";
 }
 
 TEST_F(RigFlight, ACameraBelowThatSeesNothingOnTheGroundDoesNotHoldTheTakeOff) {

@@ -8,6 +8,7 @@
 #include "platform/mission/mission.hpp"
 #include "platform/sitl/world/world_file.hpp"
 #include "platform/vehicle/vehicle_file.hpp"
+#include "tests/platform/sitl/vehicle/flight.hpp"
 
 namespace roborun::mission {
 namespace {
@@ -50,6 +51,15 @@ TEST_P(ShippedVehicle, ReachesItsGoalAndKeepsNearItsReference) {
   EXPECT_GT(error_m, 0.001) << "nothing was compared";
   EXPECT_LE(error_m, vehicle.model.tracking_error_m);
   EXPECT_LE(r.max_velocity_mps, 1.15 * vehicle.model.speed_mps);
+}
+
+TEST_P(ShippedVehicle, KeepsNearerToItsReferenceWhereItFliesSlowly) {
+  const VehicleModel model = vehicle::load_vehicle(GetParam()).model;
+  if (model.slow_error_m == 0.0) GTEST_SKIP() << "it never flies narrow places slowly";
+  const double worst_m = test::worst_beside_walls_m(model, model.slow_speed_mps, 6, 400);
+  RecordProperty("worst_m", std::to_string(worst_m));
+  EXPECT_GT(worst_m, 0.001) << "nothing was compared";
+  EXPECT_LE(worst_m, model.slow_error_m);
 }
 
 /// Wider than a block of the memory of ways has cells.
