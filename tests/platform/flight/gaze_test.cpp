@@ -35,6 +35,12 @@ class GazeTest : public ::testing::Test {
     }
     return yaw_;
   }
+  /// Until it may fly.
+  void look_round(Gaze& sut) {
+    sut.begin(0.5);
+    (void)run(sut, straight({0, 0, 1.5}, 0.1, now_), 9.0);
+    EXPECT_TRUE(sut.ready());
+  }
   GazeConfig config_{.follows = true, .yaw_rate_radps = 0.8};
   MonotonicTime now_{};
   std::uint64_t number_{1};
@@ -70,9 +76,7 @@ TEST_F(GazeTest, LooksRoundOnceWhileItClimbsAndIsReadyAfterBoth) {
 
 TEST_F(GazeTest, LooksWhereItFliesAndRoundWhenItIsStuck) {
   Gaze sut(config_, kFrame_s);
-  sut.begin(0.5);
-  (void)run(sut, straight({0, 0, 1.5}, 0.1, now_), 9.0);
-  ASSERT_TRUE(sut.ready());
+  look_round(sut);
   ++number_;
   const Trajectory left = straight({0, 2, 0}, 10.0, now_);
   EXPECT_NEAR(run(sut, left, 5.0), 0.5 * core::kPi, 1e-6);
@@ -87,9 +91,7 @@ TEST_F(GazeTest, LooksWhereItFliesAndRoundWhenItIsStuck) {
 
 TEST_F(GazeTest, LooksAtWhatItHasToSeeAlsoWhileItStepsBack) {
   Gaze sut(config_, kFrame_s);
-  sut.begin(0.5);
-  (void)run(sut, straight({0, 0, 1.5}, 0.1, now_), 9.0);
-  ASSERT_TRUE(sut.ready());
+  look_round(sut);
   target_ = GazeTarget{Vector3(20, 0, 0)};
   ++number_;
   const Trajectory back = straight({-1, 0, 0}, 5.0, now_);
@@ -102,9 +104,7 @@ TEST_F(GazeTest, LooksAtWhatItHasToSeeAlsoWhileItStepsBack) {
 
 TEST_F(GazeTest, LooksAsideOfItsFlightAsFarAsTheWayAheadStaysInView) {
   Gaze sut(config_, kFrame_s);
-  sut.begin(0.5);
-  (void)run(sut, straight({0, 0, 1.5}, 0.1, now_), 9.0);
-  ASSERT_TRUE(sut.ready());
+  look_round(sut);
   ++number_;
   const Trajectory on = straight({1, 0, 0}, 12.0, now_);
   target_ = GazeTarget{Vector3(100, 20, 0), true};
