@@ -47,8 +47,8 @@ bool is_swept_free(const MapView& view, const Vector3& a_W, const Vector3& b_W, 
   if (!(radius_m > 0.0) || !std::isfinite(radius_m)) return false;
   // Most of what is not free is so right here.
   constexpr double kInscribed = 0.577;  // the half edge of the cube in a ball of radius 1
-  for (const Vector3& p_W : {a_W, b_W})
-    if (!view.is_free(Aabb::around(p_W, kInscribed * radius_m), lookups)) return false;
+  if (!view.is_free(Aabb::around(a_W, kInscribed * radius_m), lookups)) return false;
+  if (a_W != b_W && !view.is_free(Aabb::around(b_W, kInscribed * radius_m), lookups)) return false;
 
   const double cell_m = view.cell_m();
   const Vector3 inside = Vector3::Constant(kInside_m);

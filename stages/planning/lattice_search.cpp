@@ -41,6 +41,7 @@ LatticeSearch::LatticeSearch(std::size_t max_nodes, core::Arena& arena) noexcept
 
 bool LatticeSearch::lay_out(const PlanRequest& request, double finest_m, int cells) noexcept {
   step_m_ = cells * finest_m;
+  is_fine_ = cells <= 2;
   if (cells > 1 && step_m_ > 2.0 * request.radius_m) return false;
   // Of the finest cells so many as there is room for, around the start.
   const double to_goal_m = (request.goal_W - request.start_W).cwiseAbs().maxCoeff();
@@ -67,8 +68,9 @@ bool LatticeSearch::fit(const PlanRequest& request, double finest_m, double reac
   for (int i = 0; i < 3; ++i) {
     const double low = std::fmax(request.bounds_W.min_W[i], request.start_W[i] - reach_m);
     const double high = std::fmin(request.bounds_W.max_W[i], request.start_W[i] + reach_m);
-    // The low side of the box just inside a cell.
-    const double phase = request.radius_m + kPhase_m;
+    // The vehicle in the middle of the cells that it touches, the low side of its box inside one.
+    const double touched_m = std::ceil(2.0 * request.radius_m / finest_m - kPhase_m) * finest_m;
+    const double phase = std::fmax(0.5 * touched_m, request.radius_m + kPhase_m);
     corner_W_[i] = std::ceil((low - phase) / finest_m) * finest_m + phase;
     const double steps = std::fmin(std::floor((high - corner_W_[i]) / step_m_), 1e6);
     if (!(steps >= 0.0)) return false;
@@ -109,6 +111,20 @@ void LatticeSearch::seed(const Task& task, int side) noexcept {
   }
 }
 
+bool LatticeSearch::is_free(const Task& task, const Vector3& p_W) const noexcept {
+  const double radius_m = task.request.radius_m;
+  if (task.view.is_free(Aabb::around(p_W, radius_m), task.work.units)) return true;
+  // The ball is in the three boxes that are as long as it along one axis and not along the others.
+  constexpr double kInscribed = 0.70711;  // no less than the root of a half
+  if (!is_fine_ || step_m_ > 2.0 * kInscribed * radius_m) return false;
+  for (int axis = 0; axis < 3; ++axis) {
+    Vector3 half_m = Vector3::Constant(kInscribed * radius_m);
+    half_m[axis] = radius_m;
+    if (!task.view.is_free({p_W - half_m, p_W + half_m}, task.work.units)) return false;
+  }
+  return true;
+}
+
 bool LatticeSearch::step(const Task& task, int side) noexcept {
   Side& s = side_[static_cast<std::size_t>(side)];
   const std::uint64_t entry = s.opened.pop();
@@ -117,8 +133,7 @@ bool LatticeSearch::step(const Task& task, int side) noexcept {
   std::uint8_t& state = state_[at];
   if ((state & (kBlocked | kClosed)) != 0) return false;
   const Vector3 p_W = at_W(at);
-  if ((p_W - task.request.start_W).norm() > task.request.horizon_m ||
-      !task.view.is_free(Aabb::around(p_W, task.request.radius_m), task.work.units)) {
+  if ((p_W - task.request.start_W).norm() > task.request.horizon_m || !is_free(task, p_W)) {
     state |= kBlocked;
     return false;
   }

@@ -12,11 +12,11 @@
 
 namespace roborun::stages {
 
-/// Nodes lie a step apart, where a box of the vehicle's radius touches as few cells as it can. A node is free if the box
-/// around it is; moves go along the axes: the boxes at their two ends cover what the vehicle sweeps, for steps of up to
-/// two radii. (Where all corners of a diagonal move are free, moves along axes lead there, too.) A coarse lattice misses
-/// what is narrow; the last one is that of the finest cells, and complete but for its memory: where that is too little, within a window
-/// around the start.
+/// Nodes lie a step apart, where a box of the vehicle's radius touches as few cells as it can. A node is free if that box is, or,
+/// with steps of one and two cells, if the three boxes are that hold the ball (as in WayShape); moves go along the axes: the boxes
+/// at their two ends cover what the ball sweeps. (Where all corners of a diagonal move are free, moves along axes lead there, too.) A
+/// coarse lattice misses what is narrow; the last one is that of the finest cells, and complete for these shapes but for its memory:
+/// where that is too little, within a window around the start.
 /// Source: Pohl, "Bi-directional search" (1971), and for the weight "Heuristic search viewed as path finding" (1970).
 class LatticeSearch {
  public:
@@ -56,6 +56,7 @@ class LatticeSearch {
   [[nodiscard]] bool fit(const PlanRequest& request, double finest_m, double reach_m) noexcept;
   void seed(const Task& task, int side) noexcept;
   [[nodiscard]] Status run(const Task& task) noexcept;
+  [[nodiscard]] bool is_free(const Task& task, const Vector3& p_W) const noexcept;
   /// Closes the most promising node of a side; true if it met the other one.
   [[nodiscard]] bool step(const Task& task, int side) noexcept;
   void push(int side, std::uint32_t index, std::uint32_t cost, std::uint8_t move) noexcept;
@@ -86,6 +87,7 @@ class LatticeSearch {
   std::array<Side, 2> side_{};
   Vector3 corner_W_ = Vector3::Zero();
   double step_m_{};
+  bool is_fine_{};  ///< As the cells of the memory of ways may be.
   Cell size_{1, 1, 1};
   std::array<std::uint32_t, 2> met_{};  ///< Neighbours, one closed by each side.
   bool overflown_{false};

@@ -130,6 +130,8 @@ class RrtStar final : public Planner {
   void add_path(const Path& path_W, core::Work& work) noexcept;
   /// The first solution where sampling finds none.
   [[nodiscard]] bool find_on_lattice(Search& s) noexcept;
+  /// Where ways are told such a search ends after so many lookups: what is left of the budget is for following them.
+  [[nodiscard]] Status search_lattice(Search& s, const PlanRequest& request, Path& path_W) noexcept;
 
   // It is not.
   /// `map`: what s.view polls for.

@@ -15,6 +15,20 @@ constexpr int kFirstTries = 40;  // of shortening
 constexpr int kTries = 16;
 constexpr std::uint32_t kShortenEvery = 32;  // samples
 constexpr std::uint32_t kSpliceEvery = 2;
+constexpr std::uint64_t kLatticeLookups = 400'000;
+
+/// A budget that is spent after so many lookups, too.
+class Share final : public core::StageBudget {
+ public:
+  Share(core::StageBudget& whole, std::uint64_t until) noexcept : whole_(whole), until_(until) {}
+  [[nodiscard]] bool spent(const core::Work& done) noexcept override {
+    return done.units >= until_ || whole_.spent(done);
+  }
+
+ private:
+  core::StageBudget& whole_;
+  std::uint64_t until_;
+};
 
 }  // namespace
 
@@ -189,12 +203,16 @@ Status RrtStar::improve(Search& s, double best_m, Path& best_W) noexcept {
   return Status::kOk;
 }
 
+Status RrtStar::search_lattice(Search& s, const PlanRequest& request, Path& path_W) noexcept {
+  if (request.ways == nullptr) return lattice_.connect(request, s.view, s.budget, s.work, path_W);
+  Share share(s.budget, s.work.units + kLatticeLookups);
+  return lattice_.connect(request, s.view, share, s.work, path_W);
+}
+
 bool RrtStar::find_on_lattice(Search& s) noexcept {
   Path path_W;
   clear(s);
-  if (lattice_.connect(s.request, s.view, s.budget, s.work, path_W) != Status::kOk ||
-      path_W.size() + 1 > node_.size())
-    return false;
+  if (search_lattice(s, s.request, path_W) != Status::kOk || path_W.size() + 1 > node_.size()) return false;
   std::int32_t parent = 0;
   for (std::size_t i = 1; i < path_W.size() && may_add(); ++i) parent = add_node(path_W[i], parent, s.work);
   if (node(parent).p_W != s.request.goal_W) return false;

@@ -84,10 +84,11 @@ Path RrtStar::chain(Search& s, std::span<const Vector3> way_W) noexcept {
       piece.start_W = path_W.back();
       piece.goal_W = way_W[next];
       piece.horizon_m = (piece.goal_W - piece.start_W).norm() + kAround_m;
+      const Vector3 around = Vector3::Constant(kAround_m);
+      piece.bounds_W.min_W = s.request.bounds_W.min_W.cwiseMax(piece.start_W.cwiseMin(piece.goal_W) - around);
+      piece.bounds_W.max_W = s.request.bounds_W.max_W.cwiseMin(piece.start_W.cwiseMax(piece.goal_W) + around);
       if (!is_ball_free(s.view, piece.goal_W, radius_m, s.work.units)) continue;
-      if (++searches > kChained ||
-          lattice_.connect(piece, s.view, s.budget, s.work, piece_W) == Status::kBudgetSpent)
-        return path_W;
+      if (++searches > kChained || search_lattice(s, piece, piece_W) == Status::kBudgetSpent) return path_W;
     }
     if (piece_W.size() < 2 || path_W.size() + piece_W.size() > Path::capacity()) return path_W;
     for (std::size_t i = 1; i < piece_W.size(); ++i) (void)path_W.push_back(piece_W[i]);

@@ -87,7 +87,7 @@ int core_width(const WayMemory::Config& config) noexcept {
 double WayMemory::positions(const Config& config) noexcept { return extent_of(config).blocks; }
 
 int WayMemory::cells_across(const Config& config) noexcept {
-  return static_cast<int>(std::ceil(2.0 * config.radius_m / config.finest_m - 1e-6));
+  return ball_shape(config.radius_m / config.finest_m).width;
 }
 
 bool WayMemory::fits(const Config& config) noexcept {
@@ -354,7 +354,7 @@ void WayMemory::forbid(const Cell& block, WayPlaces& places) const noexcept {
 
 void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   WayPlaces places;
-  find_places(cells, width_, 0, places);
+  find_places(cells, ball_shape(config_.radius_m / config_.finest_m), 0, places);
   forbid(block, places);
   WayCells sure = cells;
   sure.only_sure = has_doubts(cells);
@@ -377,7 +377,7 @@ void WayMemory::renew(const Cell& block, const WayCells& cells) noexcept {
   Block* b = take(position);
   if (b == nullptr) return;
   WayPlaces narrow;
-  if (narrow_width_ < width_ || sure.only_sure) find_places(sure, narrow_width_, 0, narrow);
+  if (narrow_width_ < width_ || sure.only_sure) find_places(sure, cube_shape(narrow_width_), 0, narrow);
   forbid(block, narrow);
   for (std::size_t i = 0; i < narrow.known.size(); ++i)
     places.doubtful[i] = static_cast<std::uint16_t>((places.doubtful[i] | narrow.known[i] | narrow.open[i]) &

@@ -41,9 +41,10 @@ CellRows across(const CellRows& rows, std::size_t face) noexcept {
 CellRows WayMemory::find_passable(const Cell& block, const WayCells& cells, const WayCells& cells_if_sure,
                                   WayPlaces& places) const noexcept {
   WayPlaces cores;
-  find_places(cells, core_width_, width_ - core_width_, cores);
+  find_places(cells, cube_shape(core_width_), width_ - core_width_, cores);
   WayPlaces sure_cores = cores;
-  if (cells_if_sure.only_sure) find_places(cells_if_sure, core_width_, width_ - core_width_, sure_cores);
+  if (cells_if_sure.only_sure)
+    find_places(cells_if_sure, cube_shape(core_width_), width_ - core_width_, sure_cores);
   CellRows passable{};
   const std::array<std::int32_t, 3> first{kBlockCells * block.x + corner_.x,
                                           kBlockCells * block.y + corner_.y,

@@ -62,6 +62,23 @@ void spread(std::size_t side, int width, std::size_t places, WideRows& rows) noe
   });
 }
 
+/// Of places of a cube of the middle those of the whole shape.
+void round_out(const WayShape& shape, std::size_t places, WideRows& rows) noexcept {
+  const auto longer = static_cast<std::size_t>(shape.width - shape.middle);
+  if (longer == 0) return;
+  const std::size_t aside = longer / 2;
+  // What is read was not written yet: it lies behind.
+  for (std::size_t z = 0; z < places; ++z) {
+    for (std::size_t y = 0; y < places; ++y) {
+      const std::uint64_t middle = rows[kSide * (z + aside) + y + aside];
+      std::uint64_t row = 0;
+      for (std::size_t i = 0; i <= longer; ++i)
+        row |= middle >> i | (rows[kSide * (z + aside) + y + i] | rows[kSide * (z + i) + y + aside]) >> aside;
+      rows[kSide * z + y] = row;
+    }
+  }
+}
+
 /// Bit x of a row becomes bit 4 x.
 std::uint64_t apart(std::uint16_t row) noexcept {
   std::uint64_t bits = row;
@@ -93,12 +110,13 @@ void number(CellRows rows, unsigned first, unsigned last, WayRooms& rooms) noexc
 
 }  // namespace
 
-void find_places(const WayCells& cells, int width, int beyond, WayPlaces& places) noexcept {
+void find_places(const WayCells& cells, const WayShape& shape, int beyond, WayPlaces& places) noexcept {
   const std::size_t count = std::size_t{kBlockCells} + static_cast<std::size_t>(beyond);
-  const std::size_t side = count + static_cast<std::size_t>(width) - 1;
+  const std::size_t side = count + static_cast<std::size_t>(shape.width) - 1;
   WideRows rows{};
   gather(cells, side, rows);
-  spread(side, width, count, rows);
+  spread(side, shape.middle, count + static_cast<std::size_t>(shape.width - shape.middle), rows);
+  round_out(shape, count, rows);
   const std::uint64_t all = (std::uint64_t{1} << count) - 1;
   // From here on known places in the upper half of a row, open ones in the lower one.
   for (std::uint64_t& row : rows) {

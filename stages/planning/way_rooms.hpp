@@ -1,6 +1,7 @@
 /// Where a vehicle fits inside one block of the map: its rooms, connected places of one kind.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -8,7 +9,27 @@
 
 namespace roborun::stages {
 
-/// A place (x, y, z) of a block is that of a vehicle `width` cells wide whose box begins with this cell. Known: all its
+/// The cells of a vehicle: three boxes of width x middle x middle about one centre, the long edge along each axis; a cube where both
+/// are the same. width - middle is even.
+struct WayShape {
+  int width{1}, middle{1};
+};
+[[nodiscard]] constexpr WayShape cube_shape(int width) noexcept { return {width, width}; }
+/// The least one that holds every cell which a ball of this radius about its centre touches, in cells.
+[[nodiscard]] constexpr WayShape ball_shape(double radius_cells) noexcept {
+  constexpr double kRootTwo = 1.41421356;
+  constexpr double kExact = 1e-6;  // a ball that ends on the border of a cell does not touch the next one
+  const auto up = [](double cells) {
+    const int whole = static_cast<int>(cells);
+    return static_cast<double>(whole) < cells ? whole + 1 : whole;
+  };
+  const int width = std::max(up(2.0 * radius_cells - kExact), 1);
+  // What is beyond the middle on two axes is at least root two of half the middle away.
+  const int middle = std::max(up(kRootTwo * radius_cells - kExact), 1);
+  return {width, middle + (width - middle) % 2};
+}
+
+/// A place (x, y, z) of a block is that of a vehicle whose width begins with this cell on each axis. Known: all its
 /// cells are free. Open: none is occupied, some unknown. Doubtful: neither, but a narrower box at its corner
 /// would be, if only what is surely occupied counted.
 /// Anything else is closed. Rooms 1 .. 7 are known, 8 .. 12 open, 13 .. 15 doubtful; 0 is closed. What is more than fits
@@ -36,13 +57,13 @@ struct WayCells {
   bool only_sure{};  ///< Of the occupied only the sure ones count; else what is vague does, too.
 };
 
-/// The rows of places of a block that are of one kind. width 1 .. 17.
+/// The rows of places of a block that are of one kind.
 struct WayPlaces {
   CellRows known{}, open{}, doubtful{};
 };
 /// The known and the open ones. Open are the known ones, too, that are at most `beyond` places before an open one: a vehicle that is so much wider ends there, before a
 /// hole that a narrow one looks into. width + beyond at most 17. RT-safe: O(beyond * 32^2) rounds.
-void find_places(const WayCells& cells, int width, int beyond, WayPlaces& places) noexcept;
+void find_places(const WayCells& cells, const WayShape& shape, int beyond, WayPlaces& places) noexcept;
 /// All places that are connected with those of `room`, of those in `rows`. RT-safe: O(256 * 16) rounds.
 void flood(const CellRows& rows, CellRows& room) noexcept;
 /// Numbers the rooms. RT-safe: O(rooms * 256 * 16).

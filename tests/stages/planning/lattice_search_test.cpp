@@ -59,6 +59,16 @@ TEST_F(LatticeSearchTest, FindsAWindow) {
   expect_way();
 }
 
+TEST_F(LatticeSearchTest, FindsAGapOnASlantThatNoBoxFitsInto) {
+  request_.radius_m = 0.8;
+  view_.occupied.push_back({Vector3(20.1, -30, 0), Vector3(20.7, 0, 20)});
+  view_.occupied.push_back({Vector3(22.2, 1.2, 0), Vector3(22.8, 30, 20)});
+  ASSERT_EQ(connect(), Status::kOk);
+  expect_way();
+  view_.occupied[0].max_W.y() = 0.9;
+  EXPECT_EQ(connect(), Status::kNoPath);
+}
+
 TEST_F(LatticeSearchTest, SaysThatThereIsNoWay) {
   wall(20, 9.0, 10.5);  // narrower than the vehicle
   EXPECT_EQ(connect(), Status::kNoPath);

@@ -168,6 +168,21 @@ TEST_F(WayMemoryTest, AGapThatMayBeWideEnoughProvesNothing) {
   EXPECT_EQ(look_and_solve(start_W_), Status::kNoPath);
 }
 
+TEST_F(WayMemoryTest, AGapOnASlantIsAsWideAsTheVehiclesBallNeeds) {
+  // 1.92 m between two corners: a cube of the vehicle's width does not fit, however it lies.
+  config_.radius_m = 0.8;
+  box(20.1, -21, 20.7, 0);
+  box(22.2, 1.2, 22.8, 21);
+  box(-15, 20, 22.8, 20.6);
+  box(-15, -20.6, 22.8, -20);
+  make();
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  EXPECT_LT(farthest_side_m(), 5.0);
+  box(20.1, -21, 20.7, 0.3);
+  ASSERT_EQ(look_and_solve(start_W_), Status::kOk);
+  EXPECT_GT(std::fabs(last_known(start_W_, 30.0).y()), 10.0) << "a cell less: around it";
+}
+
 TEST_F(WayMemoryTest, AGapThatIsOneCellTooNarrowIsAWayWhereThereIsNoOther) {
   // Three cells of it are free: as wide as a vehicle of 0.45 m, which plans with 0.55, and so with four cells.
   config_.radius_m = 0.55;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <vector>
 
 #include "core/random/counter_rng.hpp"
@@ -46,17 +48,56 @@ struct Scene {
   WayCells cells;
 };
 
-TEST(WayRooms, PlacesAreThoseOfABoxOfCells) {
-  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+/// In cells, from the middle of the shape to what of a cell is nearest to it along one axis.
+double to_cell(int width, int cell) {
+  const double from = std::fabs(cell + 0.5 - 0.5 * width);
+  return std::fmax(from - 0.5, 0.0);
+}
+
+bool is_in(const WayShape& shape, int x, int y, int z) {
+  const double middle = 0.5 * shape.middle;
+  int beyond = 0;
+  for (const int cell : {x, y, z}) beyond += std::fabs(cell + 0.5 - 0.5 * shape.width) > middle ? 1 : 0;
+  return beyond <= 1;
+}
+
+TEST(WayRooms, AShapeHoldsItsBallAndNoCellWithoutNeed) {
+  for (double radius = 0.3; radius < 8.5; radius += 0.0371) {
+    const WayShape shape = ball_shape(radius);
+    ASSERT_EQ(shape.width, static_cast<int>(std::ceil(2.0 * radius)));
+    ASSERT_LE(shape.middle, shape.width);
+    ASSERT_EQ((shape.width - shape.middle) % 2, 0);
+    for (int i = 0; i < shape.width * shape.width * shape.width; ++i) {
+      const int x = i % shape.width, y = i / shape.width % shape.width, z = i / shape.width / shape.width;
+      const double near =
+          std::hypot(to_cell(shape.width, x), to_cell(shape.width, y), to_cell(shape.width, z));
+      if (near < radius) {
+        ASSERT_TRUE(is_in(shape, x, y, z)) << radius << " " << x << " " << y << " " << z;
+      }
+    }
+    // With a middle that is two cells less the ball would not fit, or it is as small as it gets.
+    const double corner = 0.5 * shape.middle - 1.0;
+    ASSERT_TRUE(shape.middle <= 2 || std::hypot(corner, corner) < radius) << radius;
+  }
+}
+
+TEST(WayRooms, PlacesAreThoseOfAShapeOfCells) {
+  constexpr std::array<WayShape, 9> kShapes{
+      {{1, 1}, {2, 2}, {3, 3}, {3, 1}, {4, 2}, {5, 5}, {6, 4}, {7, 3}, {9, 7}}};
+  for (std::uint64_t seed = 0; seed < 27; ++seed) {
     const Scene scene(seed);
-    const std::size_t width = 1 + seed % 7;
+    const WayShape shape = kShapes[seed % kShapes.size()];
     WayPlaces places;
-    find_places(scene.cells, static_cast<int>(width), 0, places);
+    find_places(scene.cells, shape, 0, places);
     for (std::size_t i = 0; i < 4096; ++i) {
       const std::size_t x = i % 16, y = i / 16 % 16, z = i / 256;
       bool free = true, occupied = false;
-      for (std::size_t k = 0; k < width * width * width; ++k) {
-        const CellState state = scene.at(x + k % width, y + k / width % width, z + k / width / width);
+      for (int k = 0; k < shape.width * shape.width * shape.width; ++k) {
+        const int dx = k % shape.width, dy = k / shape.width % shape.width,
+                  dz = k / shape.width / shape.width;
+        if (!is_in(shape, dx, dy, dz)) continue;
+        const CellState state = scene.at(x + static_cast<std::size_t>(dx), y + static_cast<std::size_t>(dy),
+                                         z + static_cast<std::size_t>(dz));
         free = free && state == CellState::kFree;
         occupied = occupied || state == CellState::kOccupied;
       }
@@ -71,9 +112,9 @@ TEST(WayRooms, AreTheConnectedPlacesOfOneKind) {
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     const Scene scene(seed);
     WayPlaces places;
-    find_places(scene.cells, 4, 0, places);
+    find_places(scene.cells, cube_shape(4), 0, places);
     WayPlaces narrow;
-    find_places(scene.cells, 3, 0, narrow);
+    find_places(scene.cells, cube_shape(3), 0, narrow);
     for (std::size_t row = 0; row < narrow.known.size(); ++row)
       places.doubtful[row] =
           static_cast<std::uint16_t>(narrow.known[row] & ~(places.known[row] | places.open[row]));
