@@ -41,7 +41,6 @@ LatticeSearch::LatticeSearch(std::size_t max_nodes, core::Arena& arena) noexcept
 
 bool LatticeSearch::lay_out(const PlanRequest& request, double finest_m, int cells) noexcept {
   step_m_ = cells * finest_m;
-  is_fine_ = cells <= 2;
   if (cells > 1 && step_m_ > 2.0 * request.radius_m) return false;
   // Of the finest cells so many as there is room for, around the start.
   const double to_goal_m = (request.goal_W - request.start_W).cwiseAbs().maxCoeff();
@@ -115,8 +114,9 @@ bool LatticeSearch::is_free(const Task& task, const Vector3& p_W) const noexcept
   const double radius_m = task.request.radius_m;
   if (task.view.is_free(Aabb::around(p_W, radius_m), task.work.units)) return true;
   // The ball is in the three boxes that are as long as it along one axis and not along the others.
-  constexpr double kInscribed = 0.70711;  // no less than the root of a half
-  if (!is_fine_ || step_m_ > 2.0 * kInscribed * radius_m) return false;
+  constexpr double kInscribed = 0.70711;                      // no less than the root of a half
+  const bool is_fine = step_m_ < 2.5 * task.view.finest_m();  // as the cells of the memory of ways may be
+  if (!is_fine || step_m_ > 2.0 * kInscribed * radius_m) return false;
   for (int axis = 0; axis < 3; ++axis) {
     Vector3 half_m = Vector3::Constant(kInscribed * radius_m);
     half_m[axis] = radius_m;

@@ -87,7 +87,6 @@ class LatticeSearch {
   std::array<Side, 2> side_{};
   Vector3 corner_W_ = Vector3::Zero();
   double step_m_{};
-  bool is_fine_{};  ///< As the cells of the memory of ways may be.
   Cell size_{1, 1, 1};
   std::array<std::uint32_t, 2> met_{};  ///< Neighbours, one closed by each side.
   bool overflown_{false};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include "stages/perception/cell_block.hpp"
@@ -16,16 +17,13 @@ struct WayShape {
 };
 [[nodiscard]] constexpr WayShape cube_shape(int width) noexcept { return {width, width}; }
 /// The least one that holds every cell which a ball of this radius about its centre touches, in cells.
-[[nodiscard]] constexpr WayShape ball_shape(double radius_cells) noexcept {
+[[nodiscard]] inline WayShape ball_shape(double radius_cells) noexcept {
   constexpr double kRootTwo = 1.41421356;
   constexpr double kExact = 1e-6;  // a ball that ends on the border of a cell does not touch the next one
-  const auto up = [](double cells) {
-    const int whole = static_cast<int>(cells);
-    return static_cast<double>(whole) < cells ? whole + 1 : whole;
-  };
-  const int width = std::max(up(2.0 * radius_cells - kExact), 1);
+  const auto up = [](double cells) { return std::max(static_cast<int>(std::ceil(cells - kExact)), 1); };
+  const int width = up(2.0 * radius_cells);
   // What is beyond the middle on two axes is at least root two of half the middle away.
-  const int middle = std::max(up(kRootTwo * radius_cells - kExact), 1);
+  const int middle = up(kRootTwo * radius_cells);
   return {width, middle + (width - middle) % 2};
 }
 
