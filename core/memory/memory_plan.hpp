@@ -38,6 +38,6 @@ struct PoolRecord {
 };
 
 /// The pools of an arena in the order in which they were taken. Records never move.
-using MemoryPlan = StaticVector<PoolRecord, 48>;
+using MemoryPlan = StaticVector<PoolRecord, 96>;
 
 }  // namespace roborun::core

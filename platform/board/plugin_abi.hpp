@@ -18,7 +18,7 @@ namespace roborun::board {
 
 /// Grows with every change of a class or struct that program and plugin both see: this file, part_request.hpp,
 /// Planner, OccupancyMap, Ways, MapView, StageBudget, DepthFrame, and what these are made of.
-inline constexpr std::uint32_t kPluginAbi = 10;
+inline constexpr std::uint32_t kPluginAbi = 11;
 
 /// A change that somebody forgot to count above, or another compiler or Eigen, shows in the sizes.
 [[nodiscard]] constexpr std::uint32_t plugin_layout() noexcept {

@@ -13,6 +13,9 @@ namespace {
 constexpr Nanos kLasts{2'000'000'000};  // without being seen
 constexpr int kSure = 3;                // sightings
 constexpr double kMoves_mps = 0.4;
+// A place is somewhere on a surface, and as wrong as the depths.
+constexpr double kLeastWay_m = 0.2;
+constexpr double kWaySigmas = 2.0;
 constexpr double kFastest_mps = 6.0;
 // A sighting is a part of the surface that came into free space: which part, differs by about the body's radius.
 constexpr double kGate_m = 1.2;
@@ -46,7 +49,8 @@ Vector3 behind(const Vector3& place_W, const Vector3& p_WB) noexcept {
 }  // namespace
 
 bool BodyTracks::is_sure(const Track& track, MonotonicTime now) noexcept {
-  return track.sightings >= kSure && now - track.seen <= kLasts && track.v_W.norm() > kMoves_mps;
+  return track.sightings >= kSure && now - track.seen <= kLasts && track.v_W.norm() > kMoves_mps &&
+         level_m(track.p_W - track.first_W) > track.least_m;
 }
 
 bool BodyTracks::is_followed(const Track& track, MonotonicTime now) noexcept {
@@ -69,17 +73,24 @@ BodyTracks::Track* BodyTracks::continued_by(const Vector3& place_W, MonotonicTim
   return nearest;
 }
 
-void BodyTracks::begin(const Vector3& place_W, const Vector3& p_WB, MonotonicTime now) noexcept {
+void BodyTracks::begin(const Vector3& place_W, const Vector3& p_WB, MonotonicTime now,
+                       const DepthError& error) noexcept {
   const auto worth = [now](const Track& track) {
     const bool moves = track.sightings >= kSure && now <= track.moved + kLasts;
     return std::pair((track.sightings > 0 ? 1 : 0) + (moves ? 1 : 0), track.seen);
   };
   Track& least = *std::min_element(track_.begin(), track_.end(),
                                    [&](const Track& a, const Track& b) { return worth(a) < worth(b); });
-  least = {.p_W = place_W, .seen = now, .behind_W = behind(place_W, p_WB), .sightings = 1};
+  least = {.p_W = place_W,
+           .seen = now,
+           .first_W = place_W,
+           .least_m = kLeastWay_m + kWaySigmas * error.at_m((place_W - p_WB).norm()),
+           .behind_W = behind(place_W, p_WB),
+           .sightings = 1};
 }
 
-void BodyTracks::observe(MonotonicTime now, const Vector3& p_WB, std::span<const Vector3> places_W) noexcept {
+void BodyTracks::observe(MonotonicTime now, const Vector3& p_WB, std::span<const Vector3> places_W,
+                         const DepthError& error) noexcept {
   for (const Vector3& place_W : places_W) {
     // A part of a body that was followed to here already says nothing new.
     const bool known = std::any_of(track_.begin(), track_.end(), [&](const Track& track) {
@@ -88,7 +99,7 @@ void BodyTracks::observe(MonotonicTime now, const Vector3& p_WB, std::span<const
     if (known) continue;
     Track* track = continued_by(place_W, now);
     if (track == nullptr) {
-      begin(place_W, p_WB, now);
+      begin(place_W, p_WB, now, error);
       continue;
     }
     see(*track, place_W, p_WB, now);

@@ -6,6 +6,7 @@
 #include <limits>
 #include <span>
 
+#include "core/depth_error.hpp"
 #include "core/geometry/vector.hpp"
 #include "core/trajectory.hpp"
 #include "firmware_if/time.hpp"
@@ -23,7 +24,9 @@ class BodyTracks {
 
   /// Places of one decision where surfaces were seen in space known to be free, at this instant. Beyond `kMost` places the
   /// one that was not seen for longest is forgotten, bodies that move last.
-  void observe(MonotonicTime now, const Vector3& p_WB, std::span<const Vector3> places_W) noexcept;
+  /// `error` is of the depths.
+  void observe(MonotonicTime now, const Vector3& p_WB, std::span<const Vector3> places_W,
+               const DepthError& error) noexcept;
   /// After observe(), with all surfaces of this decision: what appeared not long ago, or is known to move, is looked for
   /// where it should be now. What is slow stays for long in cells that are not free, and appears once. O(tracks x points).
   void follow(MonotonicTime now, const Vector3& p_WB, std::span<const stages::CloudPoint> points) noexcept;
@@ -54,6 +57,8 @@ class BodyTracks {
     Vector3 v_W = Vector3::Zero();
     MonotonicTime seen{};
     MonotonicTime moved = MonotonicTime::min();  ///< When it was last seen to move.
+    Vector3 first_W = Vector3::Zero();           ///< Where it was seen first.
+    double least_m{};                            ///< What is not as far from there may be noise: level.
     Vector3 behind_W = Vector3::Zero();          ///< From what was seen of it to its middle.
     int sightings{0};
   };
@@ -68,7 +73,8 @@ class BodyTracks {
   [[nodiscard]] static bool is_followed(const Track& track, MonotonicTime now) noexcept;
   /// The track that this place continues, or null.
   [[nodiscard]] Track* continued_by(const Vector3& place_W, MonotonicTime now) noexcept;
-  void begin(const Vector3& place_W, const Vector3& p_WB, MonotonicTime now) noexcept;
+  void begin(const Vector3& place_W, const Vector3& p_WB, MonotonicTime now,
+             const DepthError& error) noexcept;
 
   std::array<Track, kMost> track_{};
 };

@@ -10,7 +10,7 @@
 #include "core/geometry/vector.hpp"
 #include "core/memory/static_vector.hpp"
 #include "firmware_if/time.hpp"
-#include "stages/perception/map_view.hpp"
+#include "stages/perception/occupancy_map.hpp"
 #include "stages/perception/point_cloud.hpp"
 
 namespace roborun::flight {
@@ -30,16 +30,14 @@ class MotionWatch {
     DepthError error{};  ///< Of the depths; where the vehicle is believed to be was as wrong a moment ago.
   };
 
-  /// Compares the cloud of this decision with `known`, the map before it gets the same images. What
-  /// is behind the vehicle is no motion: who is followed must not slow down. `work.units` counts map lookups.
-  void sense(const Input& in, std::span<const stages::CloudPoint> points, const stages::MapView& known,
+  /// Compares the cloud of this decision with the map before it gets the same images, and with the images that it was given a
+  /// moment ago. What is behind the vehicle is no motion: who is followed must not slow down. `work.units` counts map lookups.
+  void sense(const Input& in, std::span<const stages::CloudPoint> points, const stages::OccupancyMap& map,
              core::StageBudget& budget, core::Work& work) noexcept;
   /// Centres of what appeared in space known to be free, in the last decision that was sensed.
   [[nodiscard]] std::span<const Vector3> appeared_W() const noexcept {
     return {appeared_W_.begin(), appeared_W_.size()};
   }
-  /// Something was seen to move within the last seconds.
-  [[nodiscard]] bool moving(MonotonicTime now) const noexcept { return now < moving_until_; }
   /// Where something was seen to move, for as long as the map may remember what has gone.
   [[nodiscard]] Places places_W(MonotonicTime now) const noexcept;
 
@@ -48,7 +46,6 @@ class MotionWatch {
     Vector3 p_W = Vector3::Zero();
     MonotonicTime until{};
   };
-  MonotonicTime moving_until_{};
   std::array<Trace, kTraces> trace_{};  ///< A ring.
   std::size_t next_trace_{0};
   core::StaticVector<Vector3, kTraces / 4> appeared_W_;

@@ -45,6 +45,10 @@ class TimedMap final : public stages::OccupancyMap {
                                    core::Work& work) noexcept override;
   void forget() noexcept override { map_.forget(); }
   [[nodiscard]] const stages::MapView& view() const noexcept override { return map_.view(); }
+  [[nodiscard]] std::uint64_t saw_through(MonotonicTime now,
+                                          std::span<const Vector3> center_W) const noexcept override {
+    return map_.saw_through(now, center_W);
+  }
   [[nodiscard]] double known_volume_m3() const noexcept override { return map_.known_volume_m3(); }
   [[nodiscard]] std::size_t bytes() const noexcept override { return map_.bytes(); }
   [[nodiscard]] std::uint64_t digest() const noexcept override { return map_.digest(); }

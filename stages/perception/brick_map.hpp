@@ -30,6 +30,7 @@
 #include "stages/perception/image_lines.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/perception/pixel_kinds.hpp"
+#include "stages/perception/scan_images.hpp"
 
 namespace roborun::stages {
 
@@ -70,6 +71,10 @@ class BrickMap final : public OccupancyMap, private MapView {
                                    core::Work& work) noexcept override;
   void forget() noexcept override;
   [[nodiscard]] const MapView& view() const noexcept override { return *this; }
+  [[nodiscard]] std::uint64_t saw_through(MonotonicTime now,
+                                          std::span<const Vector3> center_W) const noexcept override {
+    return history_.saw_through(now, center_W);
+  }
   [[nodiscard]] double known_volume_m3() const noexcept override;
   [[nodiscard]] std::size_t bytes() const noexcept override;
   [[nodiscard]] std::uint64_t digest() const noexcept override;
@@ -268,7 +273,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   FrameGuard guard_{};
   HoleReach reach_{};
   std::span<float> filled_;  ///< An image.
-  SightCameras cameras_{};
+  ScanHistory history_;
+  ScanImages* scan_{nullptr};  ///< The last one.
   BrickSeen seen_{};
   PixelRow pixels_{};
   SurfaceRow row_{};
@@ -280,7 +286,6 @@ class BrickMap final : public OccupancyMap, private MapView {
   Brick free_brick_{};     ///< What every free position reads as.
   Brick surface_brick_{};  ///< The same for kSurfaceBrick.
   std::array<std::size_t, kMaxCameras> frame_of_{};
-  std::array<std::optional<DepthPyramid>, kMaxCameras> pyramid_{};
   std::uint64_t known_cells_{0};
   std::int32_t free_now_{kFreeBrick};  ///< A slot that is free and was seen past as a whole in this scan.
   Vector3 vehicle_W_ = Vector3::Zero();

@@ -75,6 +75,13 @@ class OccupancyMap {
   /// The view of the last export_view(); stays valid until the next integrate() or forget().
   [[nodiscard]] virtual const MapView& view() const noexcept = 0;
 
+  /// Which of at most 64 cubes of 0.2 m were seen past, all over, in the images of a moment before `now`: free then, however
+  /// coarse the cells are that it keeps of them. Bit i is cube i. A map that keeps no images says none.
+  [[nodiscard]] virtual std::uint64_t saw_through(MonotonicTime /*now*/,
+                                                  std::span<const Vector3> /*center_W*/) const noexcept {
+    return 0;
+  }
+
   [[nodiscard]] virtual double known_volume_m3() const noexcept = 0;
   [[nodiscard]] virtual std::size_t bytes() const noexcept = 0;
   [[nodiscard]] virtual std::uint64_t digest() const noexcept = 0;

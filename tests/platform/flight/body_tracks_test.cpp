@@ -12,13 +12,14 @@ namespace {
 
 constexpr double kPlanned_m = 0.9;
 constexpr double kOwn_m = 0.6;
+constexpr DepthError kExact{.constant_m = 0.01, .quadratic_per_m = 0.0};
 const Vector3 kEye_W{0, 0, 3};  // where the vehicle sees them from
 
 MonotonicTime at_s(double time_s) { return MonotonicTime{from_seconds(time_s)}; }
 
 void see(BodyTracks& sut, double time_s, const Vector3& p_W) {
   const std::array<Vector3, 1> place_W{p_W};
-  sut.observe(at_s(time_s), kEye_W, place_W);
+  sut.observe(at_s(time_s), kEye_W, place_W, kExact);
 }
 
 /// Seen every 0.2 s up to `until_s`, crossing from the right at 2 m/s; in front of (10, 0) after 5 s.
@@ -50,6 +51,26 @@ TEST(BodyTracks, KnowNothingFromOneLookOrFromWhatStands) {
     see(sut, t, {5.0 + rng.uniform(-0.05, 0.05), rng.uniform(-0.05, 0.05), 3});
   EXPECT_EQ(sut.count(at_s(3.0)), 0U);
   EXPECT_EQ(sut.meets(straight(0.0, 1.0), at_s(3.0), kPlanned_m, kOwn_m).near_s, BodyTracks::kNever);
+}
+
+// A pole that few looks meet appears again and again; the mean of three points is less wrong than each.
+TEST(BodyTracks, DoNotTakeNoiseForMotion) {
+  for (const double error_m : {0.01, 0.25}) {
+    BodyTracks sut;
+    core::CounterRng rng(5);
+    std::size_t moved = 0;
+    for (double t = 0.0; t < 6.0; t += 0.1) {
+      const std::array<Vector3, 1> place_W{
+          Vector3(8.0 + rng.uniform(-0.3, 0.3), rng.uniform(-0.1, 0.1), 3.0 + rng.uniform(-0.5, 0.5))};
+      sut.observe(at_s(t), kEye_W, place_W, {.constant_m = error_m, .quadratic_per_m = 0.0});
+      moved += sut.count(at_s(t));
+    }
+    if (error_m < 0.1) {
+      EXPECT_GT(moved, 0U) << "this test sees no difference";
+    } else {
+      EXPECT_EQ(moved, 0U);
+    }
+  }
 }
 
 TEST(BodyTracks, PredictWhereABodyCrosses) {
@@ -181,7 +202,7 @@ TEST(BodyTracks, PlacesThatStandPushOutNoBodyThatMoves) {
   std::array<Vector3, BodyTracks::kMost + 2> places_W;  // newer than it, far away
   for (std::size_t i = 0; i < places_W.size(); ++i)
     places_W[i] = Vector3(100.0 + 8.0 * static_cast<double>(i), 0.0, 3.0);
-  sut.observe(at_s(2.4), kEye_W, places_W);
+  sut.observe(at_s(2.4), kEye_W, places_W, kExact);
   EXPECT_EQ(sut.count(at_s(2.4)), 1U);
 }
 
@@ -192,7 +213,7 @@ TEST(BodyTracks, FollowManyAtOnceAndForgetTheOldest) {
     for (std::size_t i = 0; i < places_W.size(); ++i)
       places_W[i] = Vector3(8.0 * static_cast<double>(i), 1.5 * t, 3.0);
     const test::NoAllocScope scope;
-    sut.observe(at_s(t), kEye_W, places_W);
+    sut.observe(at_s(t), kEye_W, places_W, kExact);
     sut.follow(at_s(t), kEye_W, {});
     (void)sut.meets(straight(0.0, 2.0), at_s(t), kPlanned_m, kOwn_m);
     EXPECT_EQ(scope.count(), 0U);

@@ -8,7 +8,7 @@
 
 #include "platform/flight/decision_pipeline.hpp"
 #include "tests/stages/perception/scene.hpp"
-#include "tests/support/box_view.hpp"
+#include "tests/support/boxes_map.hpp"
 
 namespace roborun::flight {
 namespace {
@@ -42,25 +42,6 @@ class Same final : public governor::DecisionPolicy {
   }
   void observe(core::StageId /*id*/, double /*predicted_s*/, double /*spent_s*/) noexcept override {}
   [[nodiscard]] double v_max_mps() const noexcept override { return speed_mps; }
-};
-
-/// Knows its boxes from the beginning, and takes nothing from images.
-class KnownMap final : public stages::OccupancyMap {
- public:
-  test::BoxView box;
-  [[nodiscard]] Status integrate(const stages::IntegrationRequest& /*request*/, core::StageBudget& /*budget*/,
-                                 stages::IntegrationResult& /*result*/) noexcept override {
-    return Status::kOk;
-  }
-  [[nodiscard]] Status export_view(const stages::ExportRequest& /*request*/, core::StageBudget& /*budget*/,
-                                   core::Work& /*work*/) noexcept override {
-    return Status::kOk;
-  }
-  void forget() noexcept override {}
-  [[nodiscard]] const stages::MapView& view() const noexcept override { return box; }
-  [[nodiscard]] double known_volume_m3() const noexcept override { return 1e5; }
-  [[nodiscard]] std::size_t bytes() const noexcept override { return 0; }
-  [[nodiscard]] std::uint64_t digest() const noexcept override { return 0; }
 };
 
 /// Straight to the goal.
@@ -142,7 +123,7 @@ class Bodies : public ::testing::Test {
   PipelineConfig config_;
   Free meter_;
   Same policy_;
-  KnownMap map_;
+  test::BoxesMap map_;
   Straight planner_;
   stages::Smoother smoother_;
 };
