@@ -60,6 +60,7 @@ std::size_t BrickMap::arena_bytes(const Config& config) noexcept {
   const std::size_t positions = position_count(config);
   return positions * (2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) + row_count(config) * sizeof(Reach) +
          config.max_bricks * (sizeof(Brick) + 2 * sizeof(std::uint32_t) + sizeof(std::uint16_t)) +
+         config.max_frames * DepthPyramid::arena_bytes(config.max_image_width, config.max_image_height) +
          ScanHistory::arena_bytes(config.max_frames, config.max_image_width, config.max_image_height) +
          config.max_image_width * config.max_image_height * sizeof(float) + 16 * alignof(std::max_align_t);
 }
@@ -92,6 +93,7 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
   known_pool_ = &arena.last_pool();
   filled_ = arena.take<float>(config.max_image_width * config.max_image_height, "map filled image");
   arena.last_pool().use(filled_.size());
+  cameras_.lattice = config.lattice;
   free_brick_.fill(evidence::kFree);
   surface_brick_.fill(evidence::kUnknown);
   surface_brick_.mip.back() |= content::kOccupied;
@@ -105,6 +107,8 @@ BrickMap::BrickMap(const Config& config, core::Arena& arena) noexcept
   high_ = {std::min(high_.x, nx_ * kBrickCells - 1), std::min(high_.y, ny_ * kBrickCells - 1),
            std::min(high_.z, nz_ * kBrickCells - 1)};
   forget();
+  for (std::size_t i = 0; i < config.max_frames; ++i)
+    pyramid_[i].emplace(arena, config.max_image_width, config.max_image_height);
 }
 
 void BrickMap::forget() noexcept {

@@ -30,7 +30,7 @@
 #include "stages/perception/image_lines.hpp"
 #include "stages/perception/occupancy_map.hpp"
 #include "stages/perception/pixel_kinds.hpp"
-#include "stages/perception/scan_images.hpp"
+#include "stages/perception/scan_history.hpp"
 
 namespace roborun::stages {
 
@@ -273,8 +273,8 @@ class BrickMap final : public OccupancyMap, private MapView {
   FrameGuard guard_{};
   HoleReach reach_{};
   std::span<float> filled_;  ///< An image.
+  SightCameras cameras_{};
   ScanHistory history_;
-  ScanImages* scan_{nullptr};  ///< The last one.
   BrickSeen seen_{};
   PixelRow pixels_{};
   SurfaceRow row_{};
@@ -286,6 +286,7 @@ class BrickMap final : public OccupancyMap, private MapView {
   Brick free_brick_{};     ///< What every free position reads as.
   Brick surface_brick_{};  ///< The same for kSurfaceBrick.
   std::array<std::size_t, kMaxCameras> frame_of_{};
+  std::array<std::optional<DepthPyramid>, kMaxCameras> pyramid_{};
   std::uint64_t known_cells_{0};
   std::int32_t free_now_{kFreeBrick};  ///< A slot that is free and was seen past as a whole in this scan.
   Vector3 vehicle_W_ = Vector3::Zero();

@@ -39,33 +39,33 @@ firmware_if::DepthFrame BrickMap::with_reach(const PosedDepthFrame& posed) noexc
 std::size_t BrickMap::usable_frames(const IntegrationRequest& request, IntegrationResult& result) noexcept {
   std::size_t clouds = 0;
   bool any = false;
-  if (request.frames.empty()) return 0;
-  scan_ = &history_.begin(request.frames.front().frame.stamp);
-  SightCameras& cameras = scan_->cameras;
-  cameras.lattice = config_.lattice;
+  cameras_.count = 0;
   guard_.begin(request.frames);
+  const bool keeps = !request.frames.empty() && history_.begin(request.frames.front().frame.stamp);
   for (std::size_t i = 0; i < request.frames.size(); ++i) {
     const PosedDepthFrame& posed = request.frames[i];
-    DepthPyramid* const image =
-        cameras.count < config_.max_frames ? &*scan_->pyramid[cameras.count] : nullptr;
+    DepthPyramid* const image = cameras_.count < config_.max_frames ? &*pyramid_[cameras_.count] : nullptr;
+    const bool has_shape = image != nullptr && check_shape(posed) == Status::kOk;
+    const firmware_if::DepthFrame frame = has_shape ? with_reach(posed) : firmware_if::DepthFrame{};
     // All pixels are read once, by the pyramid: it counts what the guard has to know.
-    if (image == nullptr || check_shape(posed) != Status::kOk ||
-        image->build(with_reach(posed), tile_shift(posed.frame, size_m(request.level))) != Status::kOk ||
+    if (!has_shape || image->build(frame, tile_shift(frame, size_m(request.level))) != Status::kOk ||
         guard_.check_content(posed) != Status::kOk ||
         (!image->shows_surface() && image->shows_anything() && is_white(posed, request.moved_W))) {
       ++result.frames_refused;
       continue;
     }
-    cameras.camera[cameras.count].prepare(posed, *image);
+    if (keeps) history_.add(posed, frame);
+    cameras_.camera[cameras_.count].prepare(posed, *image);
     any = any || image->shows_anything();
     clouds += posed.is_cloud ? 1U : 0U;
-    frame_of_[cameras.count++] = i;
+    frame_of_[cameras_.count++] = i;
   }
   counters_.frames_refused += result.frames_refused;
-  const std::size_t images = cameras.count - clouds;
-  cameras.complete =
+  const std::size_t images = cameras_.count - clouds;
+  cameras_.complete =
       clouds > 0 ? images == 0 && clouds == CloudImages::kImages : images == config_.all_around_frames;
-  return any ? cameras.count : 0;
+  if (keeps) history_.set_complete(cameras_.complete);
+  return any ? cameras_.count : 0;
 }
 
 std::size_t BrickMap::unit_index(const Position& unit) const noexcept {
@@ -148,10 +148,10 @@ double BrickMap::volume_m3(const Vector3& center_W, double edge_m) const noexcep
 
 Aabb BrickMap::reach_W() const noexcept {
   const double rounding_m = finest_m();
-  Vector3 low = scan_->cameras.camera[0].p_WC;
+  Vector3 low = cameras_.camera[0].p_WC;
   Vector3 high = low;
-  for (std::size_t i = 0; i < scan_->cameras.count; ++i) {
-    const SightCamera& c = scan_->cameras.camera[i];
+  for (std::size_t i = 0; i < cameras_.count; ++i) {
+    const SightCamera& c = cameras_.camera[i];
     for (int axis = 0; axis < 3; ++axis) {
       const auto k = static_cast<std::size_t>(axis);
       const double ahead = static_cast<double>(c.range_m) * static_cast<double>(c.R_CW[k]);
@@ -221,7 +221,7 @@ int BrickMap::finest_at(const Vector3& center_W, int finest) const noexcept {
 
 void BrickMap::clear_brick(const Position& at, std::uint8_t cameras, int finest, core::Work& work) noexcept {
   const Vector3 center_W = brick_center_W(at.x, at.y, at.z);
-  see_brick(scan_->cameras, {center_W, kBrickLevel, cameras}, finest_at(center_W, finest), seen_);
+  see_brick(cameras_, {center_W, kBrickLevel, cameras}, finest_at(center_W, finest), seen_);
   work.units += seen_.visited;
   work.volume_m3 += seen_.free_cells * volume_m3(center_W, brick_m()) / kCellsPerBrick;
   if (seen_.count == 0 || slot_[slot_of(at.x, at.y, at.z)] <= kFreeBrick) return;
@@ -240,7 +240,7 @@ void BrickMap::clear_brick(const Position& at, std::uint8_t cameras, int finest,
 
 bool BrickMap::clear_block(const Position& block, std::uint8_t cameras, int finest, core::StageBudget& budget,
                            core::Work& work) noexcept {
-  const EightSeen eight = see_children(scan_->cameras, {unit_center_W(block), kBlockLevel, cameras});
+  const EightSeen eight = see_children(cameras_, {unit_center_W(block), kBlockLevel, cameras});
   ++work.units;
   for (std::int32_t child = 0; child < 8; ++child) {
     const Position at{2 * block.x + (child & 1), 2 * block.y + ((child >> 1) & 1),
@@ -274,7 +274,7 @@ std::size_t BrickMap::clear_units(std::size_t count, const IntegrationRequest& r
       unit_of[i] = unit_at(order_[first + i]);
       center_W[i] = unit_center_W(unit_of[i]);
     }
-    const BlocksSeen seen = see_blocks(scan_->cameras, unit_level_, std::span(center_W).first(here));
+    const BlocksSeen seen = see_blocks(cameras_, unit_level_, std::span(center_W).first(here));
     work.units += (here + 7) / 8;
     for (std::size_t i = 0; i < here; ++i) {
       const Position& unit = unit_of[i];
@@ -282,7 +282,7 @@ std::size_t BrickMap::clear_units(std::size_t count, const IntegrationRequest& r
       const bool is_mixed = !is_free && ((seen.mixed >> i) & 1U) != 0;
       // Near blocks make a look at many at once a rough one. What is not divided is looked at once more, alone.
       if (is_mixed && finest >= unit_level_) {
-        is_free = (see_blocks(scan_->cameras, unit_level_, std::span(center_W).subspan(i, 1)).free & 1U) != 0;
+        is_free = (see_blocks(cameras_, unit_level_, std::span(center_W).subspan(i, 1)).free & 1U) != 0;
         ++work.units;
       }
       if (is_free) {
@@ -317,12 +317,12 @@ Status BrickMap::integrate(const IntegrationRequest& request, core::StageBudget&
   if (usable_frames(request, result) == 0 || request.trajectory_W.empty()) return Status::kInvalidArgument;
   ++counters_.scans;
   free_now_ = kFreeBrick - 1 - static_cast<std::int32_t>(counters_.scans % kFreeStamps);
-  vehicle_W_ = scan_->cameras.camera[0].p_WC - request.frames[frame_of_[0]].p_BC_W;
+  vehicle_W_ = cameras_.camera[0].p_WC - request.frames[frame_of_[0]].p_BC_W;
   double pitch = 0.0;
   least_pitch_ = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < scan_->cameras.count; ++i) {
-    const double across = 1.0 / static_cast<double>(scan_->cameras.camera[i].columns_per_tan);
-    const double along = 1.0 / static_cast<double>(scan_->cameras.camera[i].rows_per_tan);
+  for (std::size_t i = 0; i < cameras_.count; ++i) {
+    const double across = 1.0 / static_cast<double>(cameras_.camera[i].columns_per_tan);
+    const double along = 1.0 / static_cast<double>(cameras_.camera[i].rows_per_tan);
     pitch = std::max({pitch, across, along});
     least_pitch_ = std::min({least_pitch_, across, along});
   }

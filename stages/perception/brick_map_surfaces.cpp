@@ -199,7 +199,7 @@ void BrickMap::add_tiles(const SurfaceCamera& camera, const DepthPyramid& image,
 
 void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work) noexcept {
   thin_seen_ = 0;
-  for (std::size_t i = 0; i < scan_->cameras.count; ++i) {
+  for (std::size_t i = 0; i < cameras_.count; ++i) {
     SurfaceCamera camera;
     camera.posed = &request.frames[frame_of_[i]];
     // A surface that is only noted leaves its whole block unknown: no look at cells of less than 4.8 m does that.
@@ -226,7 +226,7 @@ void BrickMap::add_surfaces(const IntegrationRequest& request, core::Work& work)
           static_cast<float>(-camera.column_pitch / finest_m() * camera.posed->X_WC.R_RT(axis, 1));
     }
     if (camera.is_coarse()) {
-      add_tiles(camera, *scan_->pyramid[i], work);
+      add_tiles(camera, *pyramid_[i], work);
     } else {
       for (std::size_t v = 0; v < frame.height; ++v) add_pixels(camera, v, 0, frame.width, work);
     }

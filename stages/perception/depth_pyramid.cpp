@@ -135,7 +135,12 @@ void DepthPyramid::fill_tiles(const firmware_if::DepthFrame& frame, unsigned shi
 }
 
 Status DepthPyramid::build(const firmware_if::DepthFrame& frame, int tile_shift) noexcept {
-  if (frame.width > max_width_ || frame.height > max_height_ || memory_.empty()) return Status::kCapacity;
+  const auto tiles = [tile_shift](std::size_t pixels) {
+    return (pixels + (std::size_t{1} << static_cast<unsigned>(tile_shift)) - 1) >>
+           static_cast<unsigned>(tile_shift);
+  };
+  if (tiles(frame.width) > max_width_ || tiles(frame.height) > max_height_ || memory_.empty())
+    return Status::kCapacity;
   steps_per_m_ = static_cast<float>(kMaxSteps - 1) / frame.range_m;
   width_ = frame.width;
   height_ = frame.height;

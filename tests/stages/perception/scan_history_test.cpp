@@ -1,4 +1,4 @@
-#include "stages/perception/scan_images.hpp"
+#include "stages/perception/scan_history.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 namespace roborun::stages {
 namespace {
 
-constexpr std::size_t kPixels = 64;
+constexpr int kPixels = 64;
 
 MonotonicTime at_s(double time_s) { return MonotonicTime{from_seconds(time_s)}; }
 
@@ -21,13 +21,10 @@ class Scans : public ::testing::Test {
   Scans() { wall_.solid.push_back({Vector3(10, -50, -50), Vector3(11, 50, 50)}); }
 
   void scan(double time_s) {
-    ScanImages& images = history_.begin(at_s(time_s));
-    for (const PosedDepthFrame& frame : wall_.look(Vector3::Zero())) {
-      DepthPyramid& image = *images.pyramid[images.cameras.count];
-      ASSERT_EQ(image.build(frame.frame), Status::kOk);
-      images.cameras.camera[images.cameras.count++].prepare(frame, image);
-    }
-    images.cameras.complete = true;
+    if (!history_.begin(at_s(time_s))) return;
+    for (const PosedDepthFrame& frame : wall_.look(Vector3::Zero(), kPixels))
+      history_.add(frame, frame.frame);
+    history_.set_complete(true);
   }
   [[nodiscard]] bool saw_through(double time_s, const Vector3& p_W) const {
     const std::array<Vector3, 1> center_W{p_W};
@@ -76,6 +73,19 @@ TEST_F(Scans, KeepOneThatIsOldEnoughHoweverSlowlyTheyCome) {
     EXPECT_TRUE(saw_through(t, {9, 0, 0})) << t;
     scan(t);
   }
+}
+
+TEST_F(Scans, KeepOfLargeImagesTheirTiles) {
+  std::vector<std::byte> memory(ScanHistory::arena_bytes(6, 640, 640));
+  core::Arena arena(memory);
+  ScanHistory large(arena, 6, 640, 640);
+  ASSERT_FALSE(arena.exhausted());
+  EXPECT_LT(memory.size(), 6 * DepthPyramid::arena_bytes(640, 640) / 4);
+  ASSERT_TRUE(large.begin(at_s(1.0)));
+  for (const PosedDepthFrame& frame : wall_.look(Vector3::Zero(), 640)) large.add(frame, frame.frame);
+  large.set_complete(true);
+  const std::array<Vector3, 2> center_W{Vector3(9, 0.3, 0.2), Vector3(12, 0.3, 0.2)};
+  EXPECT_EQ(large.saw_through(at_s(1.5), center_W), 1U);
 }
 
 TEST_F(Scans, SawThroughWhereOneOfThemDid) {

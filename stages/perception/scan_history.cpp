@@ -1,0 +1,70 @@
+#include "stages/perception/scan_history.hpp"
+
+#include <algorithm>
+
+namespace roborun::stages {
+namespace {
+
+constexpr std::size_t kSide =
+    160;  // tiles: of a camera of 90 degrees one is as wide as a body of 0.3 m at 24 m
+constexpr int kMostShift = 3;
+constexpr PrecisionLattice kCubes{.finest_m =
+                                      0.5 * ScanHistory::kCube_m};  // of level 1: all of the cube counts
+
+std::size_t most_tiles(std::size_t pixels) noexcept {
+  constexpr std::size_t kTile = std::size_t{1} << kMostShift;
+  return std::min(pixels, std::max(kSide, (pixels + kTile - 1) / kTile));
+}
+
+}  // namespace
+
+std::size_t ScanHistory::arena_bytes(std::size_t frames, std::size_t max_width,
+                                     std::size_t max_height) noexcept {
+  return 2 * frames * DepthPyramid::arena_bytes(most_tiles(max_width), most_tiles(max_height));
+}
+
+ScanHistory::ScanHistory(core::Arena& arena, std::size_t frames, std::size_t max_width,
+                         std::size_t max_height) noexcept {
+  for (Scan& scan : scan_) {
+    scan.cameras.lattice = kCubes;
+    for (std::size_t i = 0; i < frames; ++i)
+      scan.pyramid[i].emplace(arena, most_tiles(max_width), most_tiles(max_height));
+  }
+}
+
+bool ScanHistory::begin(MonotonicTime stamp) noexcept {
+  const Scan& last = scan_[last_];
+  if (last.cameras.count > 0 && stamp >= last.stamp && stamp - last.stamp < kApart) return false;
+  if (last.cameras.count > 0) last_ = 1 - last_;
+  scan_[last_].stamp = stamp;
+  scan_[last_].cameras.count = 0;
+  return true;
+}
+
+void ScanHistory::add(const PosedDepthFrame& posed, const firmware_if::DepthFrame& frame) noexcept {
+  Scan& scan = scan_[last_];
+  if (scan.cameras.count == kMaxCameras || !scan.pyramid[scan.cameras.count]) return;
+  DepthPyramid& image = *scan.pyramid[scan.cameras.count];
+  int shift = 0;
+  while (shift < kMostShift && std::max(frame.width, frame.height) > kSide << static_cast<unsigned>(shift))
+    ++shift;
+  if (image.build(frame, shift) == Status::kOk)
+    scan.cameras.camera[scan.cameras.count++].prepare(posed, image);
+}
+
+void ScanHistory::forget() noexcept {
+  for (Scan& scan : scan_) scan.cameras.count = 0;
+}
+
+std::uint64_t ScanHistory::saw_through(MonotonicTime now, std::span<const Vector3> center_W) const noexcept {
+  if (center_W.empty()) return 0;
+  std::uint64_t through = 0;
+  for (const Scan& scan : scan_) {
+    const Nanos age = now - scan.stamp;
+    if (scan.cameras.count == 0 || age < kYoungest || age > kOldest) continue;
+    through |= see_blocks(scan.cameras, 1, center_W).free;
+  }
+  return through & (~std::uint64_t{0} >> (BlocksSeen::kMost - std::min(center_W.size(), BlocksSeen::kMost)));
+}
+
+}  // namespace roborun::stages
