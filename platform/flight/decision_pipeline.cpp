@@ -142,7 +142,7 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
                 budget, work);
   bodies_.observe(in.now, in.p_WB, motion_.appeared_W(), worst_depth_error(in.frames));
   bodies_.follow(in.now, in.p_WB, cloud_.points());
-  out.motion = bodies_.near(in.now, in.p_WB, in.v_WB, MotionWatch::kReach_m);
+  out.motion = motion_.startled(in.now) || bodies_.near(in.now, in.p_WB, in.v_WB, MotionWatch::kReach_m);
   // Where views leave gaps a coarse cell is rarely seen whole: in such cells nothing were visible, the governor would hurry,
   // choose coarser ones, and see as little again.
   const stages::FinestView finest(map_.view());

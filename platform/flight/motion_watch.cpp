@@ -17,6 +17,7 @@ constexpr int kLeastPoints = 3;
 constexpr double kStanding_mps = 0.5;
 // Points of one body may lie so much above each other: far away the pixels of an upright one are farther apart than it is wide.
 constexpr double kHigh_m = 1.5;
+constexpr Nanos kMemory{3'000'000'000};
 constexpr Nanos kTraceMemory{10'000'000'000};  // as long as the map may remember what has gone
 
 /// Points that appeared, by place.
@@ -87,6 +88,7 @@ void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> poi
     const Vector3 seen_W = place.sum_W / place.points;
     (void)appeared_W_.push_back(surface_middle_W(seen_W, points).value_or(seen_W));
     if (place.ahead < kLeastPoints) continue;
+    if ((seen_W - in.p_WB).norm() < kNear_m) startled_until_ = in.now + kMemory;
     trace_[next_trace_] = {place.p_W, in.now + kTraceMemory};
     next_trace_ = (next_trace_ + 1) % kTraces;
   }

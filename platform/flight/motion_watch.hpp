@@ -38,14 +38,18 @@ class MotionWatch {
   [[nodiscard]] std::span<const Vector3> appeared_W() const noexcept {
     return {appeared_W_.begin(), appeared_W_.size()};
   }
+  /// Something appeared near ahead within the last seconds: too near to wait until it is known whether it moves, and how.
+  [[nodiscard]] bool startled(MonotonicTime now) const noexcept { return now < startled_until_; }
   /// Where something was seen to move, for as long as the map may remember what has gone.
   [[nodiscard]] Places places_W(MonotonicTime now) const noexcept;
 
  private:
+  static constexpr double kNear_m = 6.0;
   struct Trace {
     Vector3 p_W = Vector3::Zero();
     MonotonicTime until{};
   };
+  MonotonicTime startled_until_{};
   std::array<Trace, kTraces> trace_{};  ///< A ring.
   std::size_t next_trace_{0};
   core::StaticVector<Vector3, kTraces / 4> appeared_W_;

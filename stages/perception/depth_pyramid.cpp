@@ -58,9 +58,10 @@ std::size_t DepthPyramid::arena_bytes(std::size_t max_width, std::size_t max_hei
          (max_width + 1) * (max_height + 1) * sizeof(std::uint32_t) + 2 * alignof(std::max_align_t);
 }
 
-DepthPyramid::DepthPyramid(core::Arena& arena, std::size_t max_width, std::size_t max_height) noexcept
+DepthPyramid::DepthPyramid(core::Arena& arena, std::size_t max_width, std::size_t max_height,
+                           const char* name) noexcept
     : max_width_(max_width), max_height_(max_height) {
-  memory_ = arena.take<Entry>(entry_count(max_width, max_height), "map depth pyramid");
+  memory_ = arena.take<Entry>(entry_count(max_width, max_height), name);
   pool_ = &arena.last_pool();
   seen_ = arena.take<std::uint32_t>((max_width + 1) * (max_height + 1), "map seen pixels");
   arena.last_pool().use(seen_.size());

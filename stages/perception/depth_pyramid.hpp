@@ -42,7 +42,8 @@ class DepthPyramid {
   /// Bytes that the constructor takes from the arena.
   [[nodiscard]] static std::size_t arena_bytes(std::size_t max_width, std::size_t max_height) noexcept;
   /// Room for images of up to max_width x max_height of their tiles.
-  DepthPyramid(core::Arena& arena, std::size_t max_width, std::size_t max_height) noexcept;
+  DepthPyramid(core::Arena& arena, std::size_t max_width, std::size_t max_height,
+               const char* name = "map depth pyramid") noexcept;
   /// kCapacity if the image has more tiles than planned. `tile_shift` in [0, 3]: the finest bounds are those of
   /// tiles of 2^tile_shift pixels a side, for eyes that need no better. O(pixels).
   [[nodiscard]] Status build(const firmware_if::DepthFrame& frame, int tile_shift = 0) noexcept;

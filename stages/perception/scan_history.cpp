@@ -28,7 +28,7 @@ ScanHistory::ScanHistory(core::Arena& arena, std::size_t frames, std::size_t max
   for (Scan& scan : scan_) {
     scan.cameras.lattice = kCubes;
     for (std::size_t i = 0; i < frames; ++i)
-      scan.pyramid[i].emplace(arena, most_tiles(max_width), most_tiles(max_height));
+      scan.pyramid[i].emplace(arena, most_tiles(max_width), most_tiles(max_height), "map earlier image");
   }
 }
 
