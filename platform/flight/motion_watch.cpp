@@ -63,7 +63,8 @@ void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> poi
   // What the map does not know to have been free: the images of a moment ago may, though they are as noisy as these.
   core::StaticVector<Vector3, 64> unsure_W;
   const auto ask = [&] {
-    const std::uint64_t free = map.saw_through(in.now, {unsure_W.begin(), unsure_W.size()});
+    const std::uint64_t free =
+        known.spent() ? 0 : map.saw_through(in.now, {unsure_W.begin(), unsure_W.size()});
     work.units += unsure_W.size();
     for (std::size_t i = 0; i < unsure_W.size(); ++i)
       if (((free >> i) & 1U) != 0) appeared.add(unsure_W[i]);

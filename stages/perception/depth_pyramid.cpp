@@ -140,7 +140,9 @@ Status DepthPyramid::build(const firmware_if::DepthFrame& frame, int tile_shift)
     return (pixels + (std::size_t{1} << static_cast<unsigned>(tile_shift)) - 1) >>
            static_cast<unsigned>(tile_shift);
   };
-  if (tiles(frame.width) > max_width_ || tiles(frame.height) > max_height_ || memory_.empty())
+  const std::size_t side = std::max(frame.width, frame.height);
+  if (side > kMaxImageSide || tiles(frame.width) > max_width_ || tiles(frame.height) > max_height_ ||
+      memory_.empty())
     return Status::kCapacity;
   steps_per_m_ = static_cast<float>(kMaxSteps - 1) / frame.range_m;
   width_ = frame.width;

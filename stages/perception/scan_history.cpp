@@ -5,16 +5,14 @@
 namespace roborun::stages {
 namespace {
 
-constexpr std::size_t kSide =
-    160;  // tiles: of a camera of 90 degrees one is as wide as a body of 0.3 m at 24 m
+// Tiles. Of a camera of 90 degrees one is as wide as a body of 0.3 m at 24 m.
+constexpr std::size_t kSide = 160;
 constexpr int kMostShift = 3;
-constexpr PrecisionLattice kCubes{.finest_m =
-                                      0.5 * ScanHistory::kCube_m};  // of level 1: all of the cube counts
+static_assert(kMaxImageSide <= kSide << kMostShift);
+// Cubes of level 1: of those of the finest level only the inner half would count.
+constexpr PrecisionLattice kCubes{.finest_m = 0.5 * ScanHistory::kCube_m};
 
-std::size_t most_tiles(std::size_t pixels) noexcept {
-  constexpr std::size_t kTile = std::size_t{1} << kMostShift;
-  return std::min(pixels, std::max(kSide, (pixels + kTile - 1) / kTile));
-}
+std::size_t most_tiles(std::size_t pixels) noexcept { return std::min(pixels, kSide); }
 
 }  // namespace
 

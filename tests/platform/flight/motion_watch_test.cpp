@@ -64,6 +64,17 @@ TEST(MotionWatch, AsksTheImagesBeforeAboutWhatTheMapDoesNotKnowToBeFree) {
   EXPECT_EQ(scene.appeared(), 1U);
 }
 
+TEST(MotionWatch, IsStartledByWhatAppearsNearAheadAlone) {
+  for (const double x_m : {5.0, 7.0, -5.0}) {
+    Scene scene;
+    scene.in.v_WB = Vector3(2, 0, 0);
+    for (const double z_m : {0.0, 0.2, 0.4}) scene.see(Vector3(x_m, 0, z_m));
+    EXPECT_EQ(scene.appeared(), 1U);
+    EXPECT_EQ(scene.watch.startled(scene.in.now + from_seconds(2.9)), x_m == 5.0) << x_m;
+    EXPECT_FALSE(scene.watch.startled(scene.in.now + from_seconds(3.1)));
+  }
+}
+
 TEST(MotionWatch, AsksAboutAllPointsOfACloud) {
   Scene scene;
   for (int i = 0; i < 200; ++i) scene.see(Vector3(10, 3 + 0.001 * i, 2.0));
