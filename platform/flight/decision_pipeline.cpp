@@ -138,9 +138,9 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   stages::CloudNeed need = stages::needed_points(profiler, in.p_WB, relevant_W);
   need.reach_m = std::fmax(need.reach_m, MotionWatch::kReach_m);
   (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), need, budget, work);
-  motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W, worst_depth_error(in.frames)}, cloud_.points(), map_,
-                budget, work);
-  bodies_.observe(in.now, in.p_WB, motion_.appeared_W(), worst_depth_error(in.frames));
+  const DepthError error = worst_depth_error(in.frames);
+  motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W, error}, cloud_.points(), map_, budget, work);
+  bodies_.observe(in.now, in.p_WB, motion_.appeared_W(), error);
   bodies_.follow(in.now, in.p_WB, cloud_.points());
   out.motion = motion_.startled(in.now) || bodies_.near(in.now, in.p_WB, in.v_WB, MotionWatch::kReach_m);
   // Where views leave gaps a coarse cell is rarely seen whole: in such cells nothing were visible, the governor would hurry,

@@ -78,7 +78,7 @@ void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> poi
       appeared.add(point.p_W);
       continue;
     }
-    if (!unsure_W.push_back(point.p_W)) continue;
+    (void)unsure_W.push_back(point.p_W);  // there is room: it asks as soon as there is none
     if (unsure_W.size() == unsure_W.capacity()) ask();
   }
   ask();
