@@ -20,6 +20,10 @@ struct DepthError {
   [[nodiscard]] constexpr double at_m(double depth_m) const noexcept {
     return constant_m + quadratic_per_m * depth_m * depth_m;
   }
+  /// Of a point, in any direction, from a place that is as wrong for all.
+  [[nodiscard]] constexpr double of_point_m(double depth_m) const noexcept {
+    return at_m(depth_m) + angle_rad * depth_m;
+  }
 };
 
 }  // namespace roborun

@@ -84,7 +84,7 @@ void BodyTracks::begin(const Vector3& place_W, const Vector3& p_WB, MonotonicTim
   least = {.p_W = place_W,
            .seen = now,
            .first_W = place_W,
-           .least_m = kLeastWay_m + kWaySigmas * error.at_m((place_W - p_WB).norm()),
+           .least_m = kLeastWay_m + kWaySigmas * error.of_point_m((place_W - p_WB).norm()),
            .behind_W = behind(place_W, p_WB),
            .sightings = 1};
 }

@@ -22,15 +22,6 @@ constexpr double kForgets = 0.9;  // what the planner took, from one decision to
 /// Of the vehicle's speed: what known way beyond a trajectory's end is flown at, on the average, when arrivals are compared.
 constexpr double kBeyond = 0.5;
 
-DepthError worst_depth_error(std::span<const stages::PosedDepthFrame> frames) noexcept {
-  DepthError worst{.constant_m = 0.0, .quadratic_per_m = 0.0};
-  for (const stages::PosedDepthFrame& frame : frames) {
-    worst.constant_m = std::fmax(worst.constant_m, frame.error.constant_m);
-    worst.quadratic_per_m = std::fmax(worst.quadratic_per_m, frame.error.quadratic_per_m);
-  }
-  return worst;
-}
-
 }  // namespace
 
 Vector3 assumed_free_half_m(const VehicleModel& vehicle, bool sees_all_around, double level_view_ratio,
@@ -138,8 +129,9 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   stages::CloudNeed need = stages::needed_points(profiler, in.p_WB, relevant_W);
   need.reach_m = std::fmax(need.reach_m, MotionWatch::kReach_m);
   (void)cloud_.step(in.frames, config_.lattice.coarsest_level_within(kPublishedCell_m), need, budget, work);
-  const DepthError error = worst_depth_error(in.frames);
-  motion_.sense({in.now, in.p_WB, in.v_WB, relevant_W, error}, cloud_.points(), map_, budget, work);
+  const DepthError error = point_error(in.frames);
+  const double stop_m = stopping_model(config_.vehicle).distance_m(in.v_WB.norm());
+  motion_.sense({in.now, in.p_WB, in.v_WB, stop_m, relevant_W, error}, cloud_.points(), map_, budget, work);
   bodies_.observe(in.now, in.p_WB, motion_.appeared_W(), error);
   bodies_.follow(in.now, in.p_WB, cloud_.points());
   out.motion = motion_.startled(in.now) || bodies_.near(in.now, in.p_WB, in.v_WB, MotionWatch::kReach_m);

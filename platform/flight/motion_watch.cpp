@@ -15,6 +15,8 @@ constexpr double kAppeared_m = 0.05;
 constexpr double kSigmas = 3.0;
 constexpr int kLeastPoints = 3;
 constexpr double kStanding_mps = 0.5;
+constexpr double kComes_mps =
+    2.0;  // half-way between slow and fast bodies; who comes from the side nears less fast
 // Points of one body may lie so much above each other: far away the pixels of an upright one are farther apart than it is wide.
 constexpr double kHigh_m = 1.5;
 constexpr Nanos kMemory{3'000'000'000};
@@ -55,6 +57,19 @@ class Appeared {
 
 }  // namespace
 
+DepthError point_error(std::span<const stages::PosedDepthFrame> frames) noexcept {
+  constexpr double kSigma = 0.577;  // of half a pixel: anywhere in it
+  DepthError worst{.constant_m = 0.0, .quadratic_per_m = 0.0};
+  for (const stages::PosedDepthFrame& posed : frames) {
+    worst.constant_m = std::fmax(worst.constant_m, posed.error.constant_m);
+    worst.quadratic_per_m = std::fmax(worst.quadratic_per_m, posed.error.quadratic_per_m);
+    if (posed.frame.width == 0) continue;
+    const double half_pixel_rad = static_cast<double>(posed.frame.tan_half_width) / posed.frame.width;
+    worst.angle_rad = std::fmax(worst.angle_rad, kSigma * half_pixel_rad);
+  }
+  return worst;
+}
+
 void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> points,
                         const stages::OccupancyMap& map, core::StageBudget& budget,
                         core::Work& work) noexcept {
@@ -73,7 +88,7 @@ void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> poi
   for (const stages::CloudPoint& point : points) {
     const double distance_m = (point.p_W - in.p_WB).norm();
     if (distance_m > kReach_m || !in.relevant_W.contains(point.p_W)) continue;
-    const double around_m = kAppeared_m + kSigmas * in.error.at_m(distance_m);
+    const double around_m = kAppeared_m + kSigmas * in.error.of_point_m(distance_m);
     if (known.is_free_at_finest(Aabb::around(point.p_W, around_m), work.units)) {
       appeared.add(point.p_W);
       continue;
@@ -82,6 +97,10 @@ void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> poi
     if (unsure_W.size() == unsure_W.capacity()) ask();
   }
   ask();
+  // It goes on coming while the vehicle brakes.
+  const double v_mps = in.v_WB.norm();
+  const double brakes_s = v_mps > kStanding_mps ? 2.0 * in.stop_m / v_mps : 0.0;
+  const double near_m = std::fmax(kNear_m, in.stop_m + kComes_mps * brakes_s);
   // A body is in one place; pixels between two depths lie here and there.
   appeared_W_.clear();
   for (const Appeared::Place& place : appeared.places()) {
@@ -89,7 +108,7 @@ void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> poi
     const Vector3 seen_W = place.sum_W / place.points;
     (void)appeared_W_.push_back(surface_middle_W(seen_W, points).value_or(seen_W));
     if (place.ahead < kLeastPoints) continue;
-    if ((seen_W - in.p_WB).norm() < kNear_m) startled_until_ = in.now + kMemory;
+    if ((seen_W - in.p_WB).norm() < near_m) startled_until_ = in.now + kMemory;
     trace_[next_trace_] = {place.p_W, in.now + kTraceMemory};
     next_trace_ = (next_trace_ + 1) % kTraces;
   }

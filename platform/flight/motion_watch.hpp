@@ -15,6 +15,9 @@
 
 namespace roborun::flight {
 
+/// Of points that such images were made into: each stands in the middle of its pixel. The worst of all.
+[[nodiscard]] DepthError point_error(std::span<const stages::PosedDepthFrame> frames) noexcept;
+
 /// RT-safe: O(points of the cloud), no allocation.
 class MotionWatch {
  public:
@@ -26,6 +29,7 @@ class MotionWatch {
     MonotonicTime now{};
     Vector3 p_WB = Vector3::Zero();
     Vector3 v_WB = Vector3::Zero();
+    double stop_m{0.0};  ///< Way to a stop from there.
     Aabb relevant_W{};   ///< What moves outside of it does not matter.
     DepthError error{};  ///< Of the depths; where the vehicle is believed to be was as wrong a moment ago.
   };

@@ -1,6 +1,7 @@
 #include "stages/perception/scan_history.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace roborun::stages {
 namespace {
@@ -46,8 +47,10 @@ void ScanHistory::add(const PosedDepthFrame& posed, const firmware_if::DepthFram
   int shift = 0;
   while (shift < kMostShift && std::max(frame.width, frame.height) > kSide << static_cast<unsigned>(shift))
     ++shift;
-  if (image.build(frame, shift) == Status::kOk)
-    scan.cameras.camera[scan.cameras.count++].prepare(posed, image);
+  if (image.build(frame, shift) != Status::kOk) return;
+  SightCamera& camera = scan.cameras.camera[scan.cameras.count++];
+  camera.prepare(posed, image);
+  camera.widening += 0.5F / std::fmin(camera.columns_per_tan, camera.rows_per_tan);
 }
 
 void ScanHistory::forget() noexcept {

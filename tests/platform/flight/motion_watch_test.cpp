@@ -53,6 +53,15 @@ TEST(MotionWatch, TakesForNoiseWhatTheDepthsMayBeWrongBy) {
   }
 }
 
+TEST(MotionWatch, TakesForNoiseWhatAPixelIsWide) {
+  for (const double angle_rad : {0.0, 0.01}) {
+    Scene scene;
+    scene.in.error.angle_rad = angle_rad;
+    for (const double z_m : {2.0, 2.2, 2.4}) scene.see(Vector3(10, 1.85, z_m));
+    EXPECT_EQ(scene.appeared(), angle_rad == 0.0 ? 1U : 0U) << angle_rad;
+  }
+}
+
 TEST(MotionWatch, AsksTheImagesBeforeAboutWhatTheMapDoesNotKnowToBeFree) {
   Scene scene;
   // Inside what the map calls a wall.
@@ -72,6 +81,17 @@ TEST(MotionWatch, IsStartledByWhatAppearsNearAheadAlone) {
     EXPECT_EQ(scene.appeared(), 1U);
     EXPECT_EQ(scene.watch.startled(scene.in.now + from_seconds(2.9)), x_m == 5.0) << x_m;
     EXPECT_FALSE(scene.watch.startled(scene.in.now + from_seconds(3.1)));
+  }
+}
+
+TEST(MotionWatch, IsStartledFartherAwayByAsMuchAsItNeedsToStop) {
+  for (const double x_m : {9.2, 9.5}) {
+    Scene scene;
+    scene.in.v_WB = Vector3(5, 0, 0);
+    scene.in.stop_m = 5.2;  // takes 2.08 s, in which a body comes 4.16 m
+    for (const double z_m : {0.0, 0.2, 0.4}) scene.see(Vector3(x_m, 0, z_m));
+    EXPECT_EQ(scene.appeared(), 1U);
+    EXPECT_EQ(scene.watch.startled(scene.in.now + from_seconds(1.0)), x_m == 9.2) << x_m;
   }
 }
 

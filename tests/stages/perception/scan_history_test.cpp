@@ -99,5 +99,15 @@ TEST_F(Scans, SawThroughWhereOneOfThemDid) {
   EXPECT_EQ(scope.count(), 0U);
 }
 
+/// A point stands in the middle of its pixel, the surface that it was seen on anywhere in it: beside a post is not yet seen through.
+TEST_F(Scans, SawThroughWhatLiesAPixelBesideAnEdge) {
+  wall_.solid[0] = {Vector3(10, -0.5, -50), Vector3(10.5, 0.5, 50)};
+  scan(1.0);
+  const double pixel_m = 10.0 * 2.0 / kPixels;
+  const double side_m = 0.5 + 0.5 * ScanHistory::kCube_m;
+  EXPECT_FALSE(saw_through(1.5, {10.2, side_m + 0.6 * pixel_m, 0}));
+  EXPECT_TRUE(saw_through(1.5, {10.2, side_m + 1.6 * pixel_m, 0}));
+}
+
 }  // namespace
 }  // namespace roborun::stages
