@@ -51,7 +51,7 @@ class Image {
   enum class Says { kNothing, kShown, kPassed };
   [[nodiscard]] Says of_cell(const Vector3& center_W, double cell_m) const {
     double near_m = kFarthest, far_m = -kFarthest, left = kFarthest, right = -kFarthest, top = kFarthest,
-           bottom = -kFarthest;
+           bottom = -kFarthest, farthest_m = 0.0;
     for (int corner = 0; corner < 8; ++corner) {
       const Vector3 aside =
           cell_m * Vector3((corner & 1) - 0.5, ((corner >> 1) & 1) - 0.5, (corner >> 2) - 0.5);
@@ -59,6 +59,7 @@ class Image {
       if (!(p_C.x() > 0.0)) return Says::kNothing;
       near_m = std::min(near_m, p_C.x());
       far_m = std::max(far_m, p_C.x());
+      farthest_m = std::max(farthest_m, posed_.is_cloud ? p_C.norm() : p_C.x());
       const double u = 0.5 * width() * (1.0 - p_C.y() / (across_ * p_C.x()));
       const double v = 0.5 * height() * (1.0 - p_C.z() / (along_ * p_C.x()));
       left = std::min(left, u);
@@ -66,7 +67,7 @@ class Image {
       top = std::min(top, v);
       bottom = std::max(bottom, v);
     }
-    if (!(left >= 0.0 && right < width() && top >= 0.0 && bottom < height() && far_m < range_m_))
+    if (!(left >= 0.0 && right < width() && top >= 0.0 && bottom < height() && farthest_m < range_m_))
       return Says::kNothing;
     const double margin_m = kSigmas * posed_.error.at_m(far_m);
     bool passed = true;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "stages/perception/brick_map.hpp"
+#include "stages/perception/empty_reach.hpp"
 
 namespace roborun::stages {
 namespace {
@@ -31,8 +32,17 @@ int tile_shift(const firmware_if::DepthFrame& frame, double p0_m) noexcept {
 firmware_if::DepthFrame BrickMap::with_reach(const PosedDepthFrame& posed) noexcept {
   firmware_if::DepthFrame frame = posed.frame;
   const std::size_t pixels = frame.depth_m.size();
-  if (pixels <= filled_.size() && reach_.fill(posed, filled_.first(pixels)))
-    frame.depth_m = filled_.first(pixels);
+  if (pixels > filled_.size()) return frame;
+  const std::span<float> filled = filled_.first(pixels);
+  if (posed.is_cloud) {
+    std::size_t i = 0;
+    for (std::size_t v = 0; v < frame.height; ++v)
+      for (std::size_t u = 0; u < frame.width; ++u, ++i)
+        filled[i] = frame.depth_m[i] >= frame.range_m ? empty_reach_m(posed, u, v) : frame.depth_m[i];
+    frame.depth_m = filled;
+  } else if (reach_.fill(posed, filled)) {
+    frame.depth_m = filled;
+  }
   return frame;
 }
 

@@ -66,7 +66,8 @@ Status CloudImages::make(const PosedCloud& cloud) noexcept {
       };
       float& nearest_m = depth_m_[i * pixels + pixel(along(view.up, view.up_sign)) * side +
                                   pixel(along(view.left, view.left_sign))];
-      const float seen_m = depth_m < cloud.range_m ? depth_m : std::numeric_limits<float>::infinity();
+      const float seen_m =
+          square_m2 < cloud.range_m * cloud.range_m ? depth_m : std::numeric_limits<float>::infinity();
       if (!(nearest_m <= seen_m)) nearest_m = seen_m;
       met = true;
     }

@@ -16,7 +16,7 @@ namespace roborun::stages {
 struct PosedCloud {
   std::span<const std::array<float, 3>> points_L{};
   MonotonicTime stamp{};
-  /// A point that is farther along an image's axis says that nothing was met within the range. (0, kMaxRange_m]
+  /// A point that is not nearer says that nothing was met within the range in its direction. (0, kMaxRange_m]
   float range_m{};
   Pose X_WL{};
   Vector3 p_BL_W = Vector3::Zero();  ///< From the middle of the vehicle to the sensor.

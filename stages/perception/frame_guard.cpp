@@ -6,23 +6,13 @@
 
 #include "core/random/counter_rng.hpp"
 #include "stages/perception/depth_steps.hpp"
+#include "stages/perception/empty_reach.hpp"
 
 namespace roborun::stages {
 namespace {
 
 constexpr std::size_t kSamples = 64;
 constexpr std::size_t kLeastSurfaces = 8;
-
-/// From the sensor to the outer corner of a pixel, in units of its depth.
-float longest_ray(const firmware_if::DepthFrame& f, std::size_t pixel) noexcept {
-  const auto aside = [](std::size_t at, std::size_t pixels) {
-    const auto middle = static_cast<float>(pixels) * 0.5F, begin = static_cast<float>(at);
-    return std::max(std::fabs(begin - middle), std::fabs(begin + 1.0F - middle)) / middle;
-  };
-  const float left = aside(pixel % f.width, f.width) * f.tan_half_width;
-  const float up = aside(pixel / f.width, f.height) * f.tan_half_height;
-  return std::sqrt(1.0F + left * left + up * up);
-}
 
 /// Of the samples of an image; 0 if too few of them show a surface. Rays of a cloud that met nothing end at its range, all
 /// in the same way.
@@ -33,7 +23,7 @@ std::uint64_t print_of(const PosedDepthFrame& posed) noexcept {
   for (std::size_t i = 0; i < kSamples; ++i) {
     const std::size_t pixel = (2 * i + 1) * frame.depth_m.size() / (2 * kSamples);
     const float depth_m = frame.depth_m[pixel];
-    const float reach_m = posed.is_cloud ? frame.range_m / longest_ray(frame, pixel) : frame.range_m;
+    const float reach_m = empty_reach_m(posed, pixel % frame.width, pixel / frame.width);
     surfaces += depth_m > frame.range_min_m && depth_m < reach_m ? 1U : 0U;
     hash = core::mix64(hash ^ std::bit_cast<std::uint32_t>(depth_m));
   }

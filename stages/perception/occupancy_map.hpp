@@ -18,8 +18,9 @@ namespace roborun::stages {
 struct PosedDepthFrame {
   firmware_if::DepthFrame frame{};
   Pose X_WC{};
-  DepthError error{};    ///< Of this camera.
-  bool is_cloud{false};  ///< Made from a cloud (cloud_images.hpp): most pixels may have no information.
+  DepthError error{};  ///< Of this camera.
+  /// Made from a cloud (cloud_images.hpp): most pixels may have no information, and the range is that of a ray (empty_reach.hpp).
+  bool is_cloud{false};
   Vector3 p_BC_W = Vector3::Zero();  ///< From the middle of the vehicle to the camera, at that instant.
 };
 

@@ -7,6 +7,7 @@
 #include "core/random/counter_rng.hpp"
 #include "firmware_if/assert.hpp"
 #include "stages/perception/depth_steps.hpp"
+#include "stages/perception/empty_reach.hpp"
 
 namespace roborun::stages {
 
@@ -77,7 +78,6 @@ bool PointCloud::Wanted::includes(const Vector3& p_W) noexcept {
 bool PointCloud::add_row(const Row& row, double cell_m, Wanted& wanted) noexcept {
   const firmware_if::DepthFrame& frame = row.posed.frame;
   const Vector3 from_W = row.posed.X_WC.p_RT;
-  const auto range_m = static_cast<double>(frame.range_m);
   const double above_m = std::fmax(high_m_ - from_W.z(), 0.0), below_m = std::fmax(from_W.z() - low_m_, 0.0);
   const float* const raw = frame.depth_m.data() + row.v * frame.width;
   const bool mixes = row.posed.error.mixes;
@@ -88,7 +88,9 @@ bool PointCloud::add_row(const Row& row, double cell_m, Wanted& wanted) noexcept
     // A hole may be sky: what the map makes of it is its own matter, but it must be allowed to.
     if (!is_value && !row.posed.error.dark_sky) continue;
     const Vector3 direction_W = row.posed.X_WC.R_RT * Vector3(1.0, row.y[u], row.z);
-    double depth_m = is_value ? std::fmin(static_cast<double>(raw[u]), range_m) : range_m;
+    double depth_m = is_value && raw[u] < frame.range_m
+                         ? static_cast<double>(raw[u])
+                         : static_cast<double>(empty_reach_m(row.posed, u, row.v));
     if (is_value && raw[u] < frame.range_m && !(mixes && pixels_.depth_m[u] == 0.0F)) {
       const Vector3 p_W = from_W + depth_m * direction_W;
       if (wanted.includes(p_W) && !add(p_W, cell_m)) room = false;

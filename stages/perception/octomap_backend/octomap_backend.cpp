@@ -13,6 +13,7 @@
 #include "core/record/state_hash.hpp"
 #include "firmware_if/assert.hpp"
 #include "stages/perception/depth_steps.hpp"
+#include "stages/perception/empty_reach.hpp"
 #include "stages/perception/frame_guard.hpp"
 
 namespace roborun::stages {
@@ -188,9 +189,9 @@ class OctomapBackend final : public OccupancyMap, private MapView {
     double total_m3 = 0.0;
     for (int v = 0; v < f.height; ++v) {
       for (int u = 0; u < f.width; ++u) {
-        double depth_m = static_cast<double>(
-            visible_depth_m(f.depth_m[static_cast<std::size_t>(v) * f.width + static_cast<std::size_t>(u)],
-                            f.range_m, f.range_min_m));
+        double depth_m = static_cast<double>(visible_depth_m(
+            f.depth_m[static_cast<std::size_t>(v) * f.width + static_cast<std::size_t>(u)],
+            empty_reach_m(posed, static_cast<std::size_t>(u), static_cast<std::size_t>(v)), f.range_min_m));
         const Vector3 d_W = posed.X_WC.R_RT * Vector3(1.0, across - (u + 0.5) * 2.0 * across / f.width,
                                                       along - (v + 0.5) * 2.0 * along / f.height);
         if (d_W.z() > 0.0)

@@ -137,6 +137,43 @@ TEST_F(CloudImagesTest, ABandOfRaysSeesABandAllAround) {
   EXPECT_EQ(map.view().at(Vector3(0.1, 0.1, 3.0), lookups), CellState::kUnknown) << "straight up";
 }
 
+TEST_F(CloudImagesTest, RaysThatMetNothingClearUpToTheRangeAndShowNoSurface) {
+  constexpr double kRange_m = 10.0;
+  std::vector<std::array<float, 3>> rays;
+  for (int ring = -44; ring <= 44; ++ring)
+    for (int column = 0; column < 360; ++column) {
+      const double up = ring * core::kPi / 180.0, turn = column * core::kPi / 180.0;
+      const double r_m = 1.01 * kRange_m;
+      rays.push_back({static_cast<float>(r_m * std::cos(up) * std::cos(turn)),
+                      static_cast<float>(r_m * std::cos(up) * std::sin(turn)),
+                      static_cast<float>(r_m * std::sin(up))});
+    }
+  BrickMap::Config config;
+  config.bounds_W = {Vector3(-15, -15, -12), Vector3(15, 15, 12)};
+  config.max_bricks = 3000;
+  config.max_image_width = config.max_image_height = 64;
+  BrickMap map(config, arena_);
+  PointCloud cloud({}, arena_);
+  ASSERT_FALSE(arena_.exhausted());
+  const std::array<Vector3, 1> here{Vector3::Zero()};
+  IntegrationResult result;
+  core::Work work;
+  ASSERT_EQ(sut_.make({rays, {}, static_cast<float>(kRange_m), {}}), Status::kOk);
+  ASSERT_EQ(cloud.step(sut_.frames(), 1, unlimited_, work), Status::kOk);
+  EXPECT_EQ(cloud.points().size(), 0U);
+  ASSERT_EQ(map.integrate({sut_.frames(), 0, 1e18, here}, unlimited_, result), Status::kOk);
+  (void)map.export_view({0, 1e18, here[0]}, unlimited_, work);
+  std::uint64_t lookups = 0;
+  // At 45 degrees the range ends where the depth along the image's axis is 7.1 m.
+  for (const double turn : {0.0, 0.4, core::kPi / 4.0, 2.0}) {
+    const Vector3 ray(std::cos(turn), std::sin(turn), 0.0);
+    EXPECT_EQ(map.view().at(9.0 * ray, lookups), CellState::kFree) << turn;
+    for (double m = 9.5; m < 14.0; m += 0.1)
+      EXPECT_NE(map.view().at(m * ray, lookups), CellState::kOccupied) << m << " " << turn;
+    EXPECT_EQ(map.view().at(10.7 * ray, lookups), CellState::kUnknown) << turn;
+  }
+}
+
 TEST_F(CloudImagesTest, FarPointsClearAndNearOnesSayNothing) {
   const auto depth_of = [&](std::array<float, 3> p) {
     const std::vector<std::array<float, 3>> points{p, {0.0F, 5.0F, 0.0F}};
