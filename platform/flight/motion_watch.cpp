@@ -63,7 +63,7 @@ DepthError point_error(std::span<const stages::PosedDepthFrame> frames) noexcept
   for (const stages::PosedDepthFrame& posed : frames) {
     worst.constant_m = std::fmax(worst.constant_m, posed.error.constant_m);
     worst.quadratic_per_m = std::fmax(worst.quadratic_per_m, posed.error.quadratic_per_m);
-    if (posed.frame.width == 0) continue;
+    if (!posed.is_cloud || posed.frame.width == 0) continue;
     const double half_pixel_rad = static_cast<double>(posed.frame.tan_half_width) / posed.frame.width;
     worst.angle_rad = std::fmax(worst.angle_rad, kSigma * half_pixel_rad);
   }

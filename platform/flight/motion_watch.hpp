@@ -15,7 +15,7 @@
 
 namespace roborun::flight {
 
-/// Of points that such images were made into: each stands in the middle of its pixel. The worst of all.
+/// Of points that such images were made into: the worst of all. A cloud's stand in the middle of their pixels, which are wide.
 [[nodiscard]] DepthError point_error(std::span<const stages::PosedDepthFrame> frames) noexcept;
 
 /// RT-safe: O(points of the cloud), no allocation.
