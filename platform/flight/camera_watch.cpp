@@ -112,8 +112,7 @@ Agreement agreement_of(const stages::PosedDepthFrame& posed, const stages::MapVi
           1.0, (1.0 - (2.0 * static_cast<double>(u) + 1.0) / f.width) * static_cast<double>(f.tan_half_width),
           (1.0 - (2.0 * static_cast<double>(v) + 1.0) / f.height) * static_cast<double>(f.tan_half_height));
       const Vector3 p_C = depth_m * ray_C;
-      const double sigma_m =
-          posed.error.at_m(depth_m) + posed.error.place_m + posed.error.angle_rad * depth_m;
+      const double sigma_m = posed.error.place_m + posed.error.of_point_m(depth_m);
       const double half_m = std::max(kBeside_m, kSigmas * sigma_m);
       (void)surfaces.push_back({p_C, std::max(kCell_m + kBeside_rad * depth_m, kSigmas * sigma_m)});
       Part& of = part[2 * (2 * j / kSide) + 2 * i / kSide];

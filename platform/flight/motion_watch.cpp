@@ -15,8 +15,7 @@ constexpr double kAppeared_m = 0.05;
 constexpr double kSigmas = 3.0;
 constexpr int kLeastPoints = 3;
 constexpr double kStanding_mps = 0.5;
-constexpr double kComes_mps =
-    2.0;  // half-way between slow and fast bodies; who comes from the side nears less fast
+constexpr double kComes_mps = 2.0;  // what a body nears by while the vehicle brakes: slow ones 1, fast ones 3
 // Points of one body may lie so much above each other: far away the pixels of an upright one are farther apart than it is wide.
 constexpr double kHigh_m = 1.5;
 constexpr Nanos kMemory{3'000'000'000};
@@ -97,7 +96,6 @@ void MotionWatch::sense(const Input& in, std::span<const stages::CloudPoint> poi
     if (unsure_W.size() == unsure_W.capacity()) ask();
   }
   ask();
-  // It goes on coming while the vehicle brakes.
   const double v_mps = in.v_WB.norm();
   const double brakes_s = v_mps > kStanding_mps ? 2.0 * in.stop_m / v_mps : 0.0;
   const double near_m = std::fmax(kNear_m, in.stop_m + kComes_mps * brakes_s);

@@ -33,6 +33,14 @@ class CloudImagesTest : public ::testing::Test {
       }
     }
   }
+  static BrickMap::Config map_of(const Aabb& bounds_W) {
+    BrickMap::Config config;
+    config.bounds_W = bounds_W;
+    config.max_bricks = 3000;
+    config.max_image_width = config.max_image_height = 64;
+    return config;
+  }
+
   std::vector<std::byte> block_;
   core::Arena arena_;
   CloudImages sut_;
@@ -67,11 +75,7 @@ TEST_F(CloudImagesTest, EachPointIsItsPixel) {
 }
 
 TEST_F(CloudImagesTest, CloudsGoIntoTheSameMapAndPointCloud) {
-  BrickMap::Config config;
-  config.bounds_W = {Vector3(-30, -30, -3), Vector3(30, 30, 12)};
-  config.max_bricks = 2000;
-  config.max_image_width = config.max_image_height = 64;
-  BrickMap map(config, arena_);
+  BrickMap map(map_of({Vector3(-30, -30, -3), Vector3(30, 30, 12)}), arena_);
   PointCloud cloud({}, arena_);
   ASSERT_FALSE(arena_.exhausted());
   ASSERT_EQ(sut_.make({point_, {}, 20.0F, X_WL_}), Status::kOk);
@@ -109,11 +113,7 @@ TEST_F(CloudImagesTest, ABandOfRaysSeesABandAllAround) {
       band.push_back({static_cast<float>(12.0 * std::cos(turn)), static_cast<float>(12.0 * std::sin(turn)),
                       static_cast<float>(12.0 * std::tan(up))});
     }
-  BrickMap::Config config;
-  config.bounds_W = {Vector3(-30, -30, -12), Vector3(30, 30, 12)};
-  config.max_bricks = 3000;
-  config.max_image_width = config.max_image_height = 64;
-  BrickMap map(config, arena_);
+  BrickMap map(map_of({Vector3(-30, -30, -12), Vector3(30, 30, 12)}), arena_);
   ASSERT_FALSE(arena_.exhausted());
   const std::array<Vector3, 1> here{Vector3::Zero()};
   IntegrationResult result;
@@ -148,11 +148,7 @@ TEST_F(CloudImagesTest, RaysThatMetNothingClearUpToTheRangeAndShowNoSurface) {
                       static_cast<float>(r_m * std::cos(up) * std::sin(turn)),
                       static_cast<float>(r_m * std::sin(up))});
     }
-  BrickMap::Config config;
-  config.bounds_W = {Vector3(-15, -15, -12), Vector3(15, 15, 12)};
-  config.max_bricks = 3000;
-  config.max_image_width = config.max_image_height = 64;
-  BrickMap map(config, arena_);
+  BrickMap map(map_of({Vector3(-15, -15, -12), Vector3(15, 15, 12)}), arena_);
   PointCloud cloud({}, arena_);
   ASSERT_FALSE(arena_.exhausted());
   const std::array<Vector3, 1> here{Vector3::Zero()};
