@@ -209,7 +209,15 @@ bool Fitter::begin(const TrajectoryPoint& start) noexcept {
   Beginning beginning;
   const auto fits = [&](double v) { return leads_on(start, v, kRough, beginning); };
   const double most_mps = course_.start_share * std::max(leg_[0].limit_mps, 0.0);
-  const double speed_mps = highest_mps(most_mps, fits, kBeginHalvings);
+  // To brake from the speed at which the acceleration has gone to zero takes less way than to slow down first and then brake: where
+  // it fits, slower ones need not, and what is looked for lies above it.
+  const double settles_s = start.a_W.norm() / limits_.jerk_mps3;
+  const double settled_mps = std::min((start.v_W + 0.5 * settles_s * start.a_W).norm(), most_mps);
+  const double least_mps = fits(settled_mps) ? settled_mps : 0.0;
+  const double speed_mps =
+      least_mps +
+      highest_mps(
+          most_mps - least_mps, [&](double more) { return fits(least_mps + more); }, kBeginHalvings);
   if (!leads_on(start, speed_mps, kExact, beginning) && !fits(speed_mps)) return false;
   if (!add_change(beginning.v_W, first_change(start, beginning.v_W), 0)) return false;
   leg_[0] = beginning.leg;

@@ -19,6 +19,9 @@ constexpr std::uint64_t kSpare = 4096;  // lookups that are granted whatever the
 constexpr double kLookAhead_m = 12.0;   // beyond a path's end
 // What a surface right ahead of a path's end costs: the way around a pillar.
 constexpr double kDetour_m = 10.0;
+// The memory's lengths are a metre or two off, for they lead through its places. Where nothing is known to stand beyond the straight
+// way, another one has to save this share of it: a fast vehicle brakes for each path that is a little shorter than the one before.
+constexpr double kOpenShare = 0.5;
 
 Vector3 towards_goal(const PlanRequest& request) noexcept {
   const Vector3 way = request.goal_W - request.start_W;
@@ -95,9 +98,15 @@ double RrtStar::promise_m(const Node& node, const PlanRequest& request) const no
 double RrtStar::detour_m(const PlanRequest& request, const MapView& view, const Vector3& p_W,
                          std::uint64_t& lookups) const noexcept {
   if (request.ways != nullptr) return 0.0;  // they know
+  const double free_m = free_ahead_m(request, view, p_W, lookups);
+  return free_m < kLookAhead_m ? kDetour_m * (1.0 - free_m / kLookAhead_m) : 0.0;
+}
+
+double RrtStar::free_ahead_m(const PlanRequest& request, const MapView& view, const Vector3& p_W,
+                             std::uint64_t& lookups) noexcept {
   const Vector3 way = request.goal_W - p_W;
   const double distance_m = way.norm();
-  if (distance_m < kShortEdge_m) return 0.0;
+  if (distance_m < kShortEdge_m) return kLookAhead_m;
   const Vector3 ahead = way / distance_m;
   const Vector3 side = request.radius_m * Vector3(-ahead.y(), ahead.x(), 0.0);
   const double reach_m = std::fmin(kLookAhead_m, distance_m);
@@ -105,11 +114,10 @@ double RrtStar::detour_m(const PlanRequest& request, const MapView& view, const 
   const double step_m = std::fmax(view.finest_m(), 0.5 * view.cell_m());
   for (double at_m = request.radius_m; at_m < reach_m; at_m += step_m) {
     for (const double share : {-1.0, 0.0, 1.0}) {
-      if (view.at(p_W + at_m * ahead + share * side, lookups) != CellState::kOccupied) continue;
-      return kDetour_m * (1.0 - at_m / kLookAhead_m);
+      if (view.at(p_W + at_m * ahead + share * side, lookups) == CellState::kOccupied) return at_m;
     }
   }
-  return 0.0;
+  return kLookAhead_m;
 }
 
 Vector3 RrtStar::sample(Search& s) const noexcept {
@@ -309,6 +317,17 @@ Status RrtStar::plan(const PlanRequest& request, const MapView& map, core::Stage
   return explore(s, map, goal_bad, best, result);
 }
 
+RrtStar::Branch RrtStar::prefer_straight(Search& s, const MapView& map, double moves_m,
+                                         const Branch& straight, const Branch& best) noexcept {
+  if (straight.node == 0 || straight.promise_m > moves_m) return best;
+  const double open_m = std::fmax(kOpenShare * node(straight.node).cost_m, straight.margin_m);
+  if (best.promise_m <= straight.promise_m - open_m) return best;
+  Spare spare(s.work);
+  const PolledView view(map, spare, s.work);
+  if (free_ahead_m(s.request, view, node(straight.node).p_W, s.work.units) < kLookAhead_m) return best;
+  return {straight.node, straight.promise_m, open_m};
+}
+
 Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32_t best,
                         PlanResult& result) noexcept {
   const PlanRequest& request = s.request;
@@ -316,6 +335,7 @@ Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32
   core::Work& work = s.work;
   Status status = Status::kOk;
   double best_m = promise_m(node(best), request) + detour_m(request, view, node(best).p_W, work.units);
+  const Branch straight{best, best_m, view.cell_m()};
   Patience patience(best_m, config_.patience);
   const Samples kept_W = in_steps(request.kept_W, config_.step_m, request.bounds_W);
   for (std::uint32_t i = 0; i < config_.max_samples && !full(); ++i) {
@@ -340,14 +360,16 @@ Status RrtStar::explore(Search& s, const MapView& map, bool goal_bad, std::int32
 
   // Better than standing still by at least one cell of the view.
   const double stay_m = promise_m(node(0), request) + detour_m(request, view, request.start_W, work.units);
-  const bool is_better = best != 0 && best_m <= stay_m - view.cell_m();
+  const double moves_m = stay_m - view.cell_m();
+  const Branch chosen = prefer_straight(s, map, moves_m, straight, {best, best_m, view.cell_m()});
+  const bool moves = chosen.node != 0 && chosen.promise_m <= moves_m;
   // A known way is as long as its corners are apart, and may wind much more: where nothing else leads on it need not pay.
-  const double below_m = is_better ? best_m - view.cell_m() : std::numeric_limits<double>::infinity();
+  const double below_m = moves ? chosen.promise_m - chosen.margin_m : std::numeric_limits<double>::infinity();
   if (request.ways != nullptr && follow_ways(s, map, below_m, result))
     return goal_bad ? Status::kGoalBlocked : Status::kOk;
-  if (!is_better) return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
+  if (!moves) return goal_bad ? Status::kGoalBlocked : Status::kNoPath;
   Spare spare(work);
-  extract(request, PolledView(map, spare, work), best, result);
+  extract(request, PolledView(map, spare, work), chosen.node, result);
   if (result.path_W.size() < 2) return Status::kNoPath;
   result.reaches_goal = (result.path_W.back() - request.goal_W).norm() <= view.cell_m();
   return goal_bad ? Status::kGoalBlocked : status;

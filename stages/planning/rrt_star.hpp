@@ -142,9 +142,20 @@ class RrtStar final : public Planner {
   [[nodiscard]] Path chain(Search& s, std::span<const Vector3> way_W) noexcept;
   [[nodiscard]] Status explore(Search& s, const MapView& map, bool goal_bad, std::int32_t best,
                                PlanResult& result) noexcept;
+  /// A node to go to, what the way over it promises to take, and what another way has to save.
+  struct Branch {
+    std::int32_t node;
+    double promise_m, margin_m;
+  };
+  /// Returns `straight` in the open, with what another way has to save there, or `best`. No promise beyond `moves_m` is worth a move.
+  [[nodiscard]] Branch prefer_straight(Search& s, const MapView& map, double moves_m, const Branch& straight,
+                                       const Branch& best) noexcept;
   [[nodiscard]] Vector3 sample(Search& s) const noexcept;
   [[nodiscard]] double promise_m(const Node& node, const PlanRequest& request) const noexcept;
-  /// What the first surface on the straight way on to the goal will cost, 0 if none is known within 12 m.
+  /// On the straight way on to the goal, to the first surface that is known; at most 12 m.
+  [[nodiscard]] static double free_ahead_m(const PlanRequest& request, const MapView& view,
+                                           const Vector3& p_W, std::uint64_t& lookups) noexcept;
+  /// What that surface will cost, 0 if none is known.
   [[nodiscard]] double detour_m(const PlanRequest& request, const MapView& view, const Vector3& p_W,
                                 std::uint64_t& lookups) const noexcept;
   void extract(const PlanRequest& request, const MapView& view, std::int32_t node,

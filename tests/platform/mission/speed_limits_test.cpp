@@ -84,6 +84,13 @@ TEST(SpeedLimits, ThatOfAVehicleWithALidarIsFlownInTheOpen) {
   expect_flown(vehicle::load_vehicle("racer"), "file");
 }
 
+TEST(SpeedLimits, ThatOfALidarsSightIsFlownInTheOpen) {
+  vehicle::Vehicle racer = vehicle::load_vehicle("racer");
+  racer.model.speed_mps = 25.0;
+  racer.rig.lidars[0].range_m = 20.0;
+  expect_flown(racer, "sight");
+}
+
 TEST(SpeedLimits, EachNumberMovesItsOwn) {
   const SpeedLimits shipped = limits_of(x500());
   ASSERT_EQ(shipped.always.size(), 3U);

@@ -114,6 +114,24 @@ TEST(Smoother, FliesFastAndBrakesLate) {
   EXPECT_NEAR(result.trajectory.at_s(duration_s * 0.5).v_W.norm(), 6.0, 1e-3);
 }
 
+// To slow down first and then to brake takes more way than to brake once: speeds between are too fast, the start's is not.
+TEST(Smoother, KeepsItsSpeedWhileOneStopFits) {
+  Smoother sut;
+  const test::BoxView view = open_view();
+  core::UnlimitedBudget unlimited;
+  SmoothRequest request =
+      request_of({Vector3(0, 0, 5), Vector3(7.12, 0.17, 5.02)}, Vector3(8.97, 0.24, 0.05));
+  request.limits = {25.0, 18.3, 30.0};
+  for (const double a_mps2 : {0.0, 0.9, 2.0, -1.0}) {
+    request.start.a_W = Vector3(a_mps2, -0.16, -0.15);
+    SmoothResult result;
+    ASSERT_EQ(sut.smooth(request, view, unlimited, result), Status::kOk) << a_mps2;
+    // A stop from 9 m/s at 30 m/s3 takes 1.1 s and 4.9 m; before it, 2.2 m at 9 m/s.
+    EXPECT_LT(result.trajectory.duration_s(), 1.4) << a_mps2 << ": 1.9 with two changes";
+    EXPECT_GT(result.trajectory.at_s(0.2).v_W.norm(), 8.7) << a_mps2;
+  }
+}
+
 TEST(Smoother, SpeedsUpAgainstDragAndBrakesWithoutIt) {
   Smoother sut;
   const test::BoxView view = open_view();
