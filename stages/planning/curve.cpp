@@ -32,6 +32,15 @@ double highest_mps(double most_mps, const Fits& fits, int halvings = kHalvings) 
   return low;
 }
 
+/// The same from `least_mps` on, which fits; that, where it is beyond `most_mps`.
+template <typename Fits>
+double highest_mps_from(double least_mps, double most_mps, const Fits& fits,
+                        int halvings = kHalvings) noexcept {
+  return least_mps + highest_mps(
+                         std::max(most_mps - least_mps, 0.0),
+                         [&](double more_mps) { return fits(least_mps + more_mps); }, halvings);
+}
+
 /// A straight piece between two points of the course.
 struct Leg {
   Vector3 direction = Vector3::Zero();
@@ -168,10 +177,9 @@ void Fitter::limit_forwards() noexcept {
     const double before_mps = speed_[i - 1];
     if (speed_[i] <= before_mps) continue;
     const double left_m = leg_[i - 1].length_m - (i > 1 ? turn_[i - 1].way_m(before_mps) : 0.0);
-    speed_[i] = before_mps + highest_mps(speed_[i] - before_mps, [&](double more) {
-                  const double v = before_mps + more;
-                  return turn_[i].way_m(v) + change_m(before_mps, v, leg_[i - 1].faster) <= left_m;
-                });
+    speed_[i] = highest_mps_from(before_mps, speed_[i], [&](double v) {
+      return turn_[i].way_m(v) + change_m(before_mps, v, leg_[i - 1].faster) <= left_m;
+    });
   }
 }
 
@@ -214,10 +222,7 @@ bool Fitter::begin(const TrajectoryPoint& start) noexcept {
   const double settles_s = start.a_W.norm() / limits_.jerk_mps3;
   const double settled_mps = std::min((start.v_W + 0.5 * settles_s * start.a_W).norm(), most_mps);
   const double least_mps = fits(settled_mps) ? settled_mps : 0.0;
-  const double speed_mps =
-      least_mps +
-      highest_mps(
-          most_mps - least_mps, [&](double more) { return fits(least_mps + more); }, kBeginHalvings);
+  const double speed_mps = highest_mps_from(least_mps, most_mps, fits, kBeginHalvings);
   if (!leads_on(start, speed_mps, kExact, beginning) && !fits(speed_mps)) return false;
   if (!add_change(beginning.v_W, first_change(start, beginning.v_W), 0)) return false;
   leg_[0] = beginning.leg;
@@ -273,9 +278,8 @@ CurveFit Fitter::add_leg(std::size_t i) noexcept {
   };
   const double least_mps = std::max(from_mps, to_mps);
   if (way_m(least_mps) > length_m + 1e-6) return CurveFit::kTooFast;
-  const double more_mps = highest_mps(std::max(leg.limit_mps - least_mps, 0.0),
-                                      [&](double more) { return way_m(least_mps + more) <= length_m; });
-  const double peak_mps = least_mps + more_mps;
+  const double peak_mps =
+      highest_mps_from(least_mps, leg.limit_mps, [&](double v) { return way_m(v) <= length_m; });
   const std::size_t straight = 2 * i + 1;
   bool room = add_change(peak_mps * leg.direction, leg.faster, straight);
   const double cruise_m = length_m - way_m(peak_mps);
