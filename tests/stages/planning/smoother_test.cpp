@@ -119,8 +119,8 @@ TEST(Smoother, KeepsItsSpeedWhileOneStopFits) {
   Smoother sut;
   const test::BoxView view = open_view();
   core::UnlimitedBudget unlimited;
-  SmoothRequest request =
-      request_of({Vector3(0, 0, 5), Vector3(7.12, 0.17, 5.02)}, Vector3(8.97, 0.24, 0.05));
+  const std::vector<Vector3> path{Vector3(0, 0, 5), Vector3(7.12, 0.17, 5.02)};
+  SmoothRequest request = request_of(path, Vector3(8.97, 0.24, 0.05));
   request.limits = {25.0, 18.3, 30.0};
   for (const double a_mps2 : {0.0, 0.9, 2.0, -1.0}) {
     request.start.a_W = Vector3(a_mps2, -0.16, -0.15);
