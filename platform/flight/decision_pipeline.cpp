@@ -356,8 +356,10 @@ void DecisionPipeline::remember(const DecisionInput& in, DecisionOutput& out) no
 }
 
 double DecisionPipeline::arrival_s(const Trajectory& trajectory, const DecisionInput& in) const noexcept {
-  double rest_m = stages::kUnknownWeight * (in.goal_W - trajectory.end_W()).norm();
-  if (ways_known_) rest_m = std::fmin(ways_->to_goal_m(trajectory.end_W()), 1e6);
+  const double straight_m = (in.goal_W - trajectory.end_W()).norm();
+  double rest_m = stages::kUnknownWeight * straight_m;
+  // The memory may have no place at the goal itself.
+  if (ways_known_ && straight_m > kAtGoal_m) rest_m = std::fmin(ways_->to_goal_m(trajectory.end_W()), 1e6);
   return seconds(trajectory.start_time - in.now) + trajectory.duration_s() +
          rest_m / (kBeyond * config_.vehicle.speed_mps);
 }

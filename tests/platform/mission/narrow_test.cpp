@@ -21,7 +21,7 @@ bool flies_through(sitl::WorldKind kind, std::uint64_t seed, const board::Profil
   const vehicle::Vehicle vehicle = vehicle::load_vehicle(name);
   MissionConfig config;
   set_vehicle(config, vehicle);
-  config.flight.seed = seed;
+  config.seed = seed;
   config.flight.costs = board.costs;
   config.flight.model = board.model;
   config.judge.time_limit_s = 300.0;

@@ -24,7 +24,7 @@ double forest_s(double speed_mps, std::uint64_t seed) {
   MissionConfig config;
   set_vehicle(config, vehicle);
   const board::Profile board = board::slower(board::paper(), 0.1);
-  config.flight.seed = seed;
+  config.seed = seed;
   config.flight.costs = board.costs;
   config.flight.model = board.model;
   config.judge.time_limit_s = 300.0;
