@@ -265,7 +265,8 @@ int Governor::asked_level(const Task& task, Decision& d) const noexcept {
 /// Step 2: how long may we think? As long as is safe, but no longer than is useful:
 ///   safe     the time budget of the trajectory (Algorithm 1; Eq. 1 without one) / decisions_per_budget
 ///   useful   `longest`, or what the precision that the space asks for takes, if that is more
-/// and never shorter than `shortest`.
+/// and never shorter than `shortest`, nor than what that precision takes if it is at most `fine_within`: in coarser cells nothing may be
+/// found, and each trajectory ends in a stop that is known to be free.
 double Governor::deadline_s(const Task& task, int asked_level, Decision& d) const noexcept {
   const Policy& policy = config_.policy;
   const SpaceProfile& profile = task.profile;
@@ -283,13 +284,16 @@ double Governor::deadline_s(const Task& task, int asked_level, Decision& d) cons
   const Nanos shortest =
       task.situation.motion ? std::max(policy.shortest, policy.shortest_in_motion) : policy.shortest;
   const Nanos longest = task.situation.motion ? shortest : policy.longest;
-  const double useful_s = std::max(seconds(longest), least_s(task, asked_level));
+  const double enough_s = least_s(task, asked_level);
+  const double useful_s = std::max(seconds(longest), enough_s);
   if (deadline_s >= useful_s) {
     deadline_s = useful_s;
     d.source = finer_levels(task.situation) > 0 ? BudgetSource::kFailures : BudgetSource::kLongest;
   }
-  if (deadline_s < seconds(shortest)) {
-    deadline_s = seconds(shortest);
+  const double shortest_s =
+      std::max(seconds(shortest), enough_s <= seconds(policy.fine_within) ? enough_s : 0.0);
+  if (deadline_s < shortest_s) {
+    deadline_s = shortest_s;
     d.source = BudgetSource::kShortest;
   }
   return deadline_s;

@@ -38,7 +38,8 @@ struct Policy {
   /// does, at t0 + 2 T. Measured, 1.5 flies fastest: the next budget is counted from a newer frame. (The
   /// authors' code divides by 2.) [1, 10]: below 1 the answer comes after the time it is for.
   double decisions_per_budget{1.5};
-  Nanos shortest{100'000'000};  ///< No decision shorter than this. > 0.
+  /// No decision shorter than this, nor than the precision that the space asks for takes, if that is at most `fine_within`. > 0.
+  Nanos shortest{100'000'000};
   /// The same while something moves nearby: how it moves is told from where it is in two decisions. > 0.
   Nanos shortest_in_motion{200'000'000};
   /// More thinking than this makes flight slower, not better, unless the precision that the space asks for

@@ -138,9 +138,7 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   // Where views leave gaps a coarse cell is rarely seen whole: in such cells nothing were visible, the governor would hurry,
   // choose coarser ones, and see as little again.
   const stages::FinestView finest(map_.view());
-  const stages::MapView& seen =
-      config_.sees_all_around ? map_.view() : static_cast<const stages::MapView&>(finest);
-  (void)profile_space(profiler, cloud_.points(), seen, *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W,
+  (void)profile_space(profiler, cloud_.points(), finest, *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W,
                       relevant_W, is_narrow_ ? slow_radius_m(config_.vehicle) : r_m, out.profile, budget,
                       work);
   out.profile.sensor_volume_m3 = cloud_.seen_volume_m3();
@@ -383,7 +381,8 @@ void DecisionPipeline::smooth(const DecisionInput& in, DecisionOutput& out) noex
     const auto stage = static_cast<core::StageId>(i);
     policy_.observe(stage, out.decision.predicted_s[i], seconds(out.cost[i]));
   }
-  failures_ = out.smoother_status == Status::kOk || in.climbing ? 0 : failures_ + 1;
+  const bool is_led_on = out.smoother_status == Status::kOk && !draft_.leaves;
+  failures_ = is_led_on || in.climbing ? 0 : failures_ + 1;
 }
 
 void DecisionPipeline::fit_narrow(core::StageBudget& budget, DecisionOutput& out) noexcept {

@@ -5,7 +5,7 @@
 
 #include "core/geometry/math.hpp"
 #include "core/geometry/yaw.hpp"
-#include "stages/planning/smoother.hpp"
+#include "stages/planning/curve.hpp"
 
 namespace roborun::flight {
 namespace {
@@ -16,6 +16,7 @@ constexpr double kGyroRange_radps = 35.0;   // 2,000 degrees a second
 constexpr double kAccelRange_mps2 = 157.0;  // 16 g
 constexpr double kBrakeShare = 0.625;  // of the limit of acceleration: besides what the path itself needs
 constexpr double kTakeOff_mps = 1.5;
+constexpr double kTakeOff_mps2 = 1.5;
 constexpr double kStand_m = 0.5;
 constexpr double kStand_mps = 0.3;
 constexpr double kNearGround_m = 1.5;  // over the take-off's height: from there on slowly
@@ -26,12 +27,22 @@ constexpr double kNotFollowed_m =
     3.0;  // an autopilot that follows a descent is not so high over its set-point
 
 /// Straight up from the ground to the height of the first hover.
-Trajectory take_off(const Vector3& ground_W, double cruise_m, double speed_mps, MonotonicTime start) {
+Trajectory take_off(const Vector3& ground_W, double cruise_m, const VehicleModel& vehicle,
+                    MonotonicTime start) {
+  const Vector3 top_W(ground_W.x(), ground_W.y(), cruise_m);
+  stages::Course line;
+  (void)line.point_W.push_back(ground_W);
+  (void)line.point_W.push_back(top_W);
+  TrajectoryPoint ground;
+  ground.p_W = ground_W;
+  const stages::MotionLimits limits{std::min(kTakeOff_mps, vehicle.climb_mps),
+                                    std::min(kTakeOff_mps2, vehicle.acceleration_mps2),
+                                    followed_limits(vehicle).jerk_mps3};
   Trajectory t;
   t.start_time = start;
-  (void)stages::append_rest_to_rest(ground_W, Vector3(ground_W.x(), ground_W.y(), cruise_m),
-                                    {speed_mps, speed_mps}, t);
-  return t;
+  stages::SegmentParts part{};
+  const bool climbs = stages::fit_curve(line, ground, limits, t, part) == stages::CurveFit::kOk;
+  return climbs && t.segment_count > 0 ? t : Trajectory::hold(ground_W, start);
 }
 
 /// Straight on to rest, its speed along a smooth step: at most 1.5 v / T of acceleration and 6 v / T^2 of jerk.
@@ -163,7 +174,7 @@ void FlightControl::commit(MonotonicTime now) {
                            autopilot_->stage == firmware_if::AutopilotStage::kOurs;
     if (!withdrawn && !may_climb(now)) return;
     committed_ = withdrawn ? stop_from(state.p_WB, state.v_WB, vehicle_, now)
-                           : take_off(state.p_WB, cruise_m_, std::min(kTakeOff_mps, vehicle_.climb_mps), now);
+                           : take_off(state.p_WB, cruise_m_, vehicle_, now);
     ++committed_number_;
     flying_ = true;
     home_W_ = committed_.end_W() + state.shift_W;

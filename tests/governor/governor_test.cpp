@@ -198,6 +198,27 @@ TEST(Governor, TimeWinsOverPrecisionAtSpeed) {
   EXPECT_LT(seconds(d.point.deadline), 1.0);
 }
 
+/// What the precision that is asked for takes a little more than the shortest decision, it is given: nobody plans among trunks in the
+/// next coarser cells, so a vehicle that hurried stopped.
+TEST(Governor, ALittleMoreTimeWinsOverUselessPrecision) {
+  SpaceProfile p = open_space(8.0, 6.0);
+  p.closest_obstacle_m = 1.7;  // asks for 0.6 m
+  for (const double share : {0.02, 0.05, 0.5}) {
+    GovernorConfig config = paper_config(Design::kAware);
+    config.model = models_of(core::slower(core::paper_profile(), share));
+    config.point_cloud_s *= share;
+    config.governor_s *= share;
+    SpaceProfile asked = p;
+    asked.speed_mps = 0.0;
+    const Decision standing = Governor(config).decide(asked, {0, 100.0});
+    const Decision hurried = Governor(config).decide(p, {0, 100.0});
+    const bool little = standing.point.deadline <= config.policy.fine_within;
+    EXPECT_EQ(little, share < 0.5) << share;
+    EXPECT_EQ(hurried.point.p0_level == standing.point.p0_level, little) << share;
+    EXPECT_TRUE(!little || hurried.point.deadline <= config.policy.fine_within) << share;
+  }
+}
+
 /// On a narrow way, on a board with a tenth of the paper's times: all 18,000 m3 in view in cells of 0.1 m take several seconds.
 TEST(Governor, FineCellsAreForWhatIsNearAndEndInTime) {
   GovernorConfig config = paper_config(Design::kAware);

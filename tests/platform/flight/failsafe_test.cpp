@@ -219,6 +219,29 @@ struct LedFlight {
 
 using firmware_if::AutopilotStage;
 
+TEST(FlightControl, ClimbsAtTheSpeedOfATakeOffFromStandingToStanding) {
+  for (const double from_m : {0.0, 6.0}) {
+    LedFlight f;
+    f.tell(AutopilotStage::kReady, false, false);
+    f.run(1.5);
+    f.p_W.z() = from_m;
+    f.tell(AutopilotStage::kOurs, true, true);
+    f.run(0.1);
+    ASSERT_TRUE(f.sut.flying());
+    const Trajectory& climb = f.sut.committed();
+    EXPECT_NEAR(climb.end_W().z(), 6.0, 1e-6);
+    double fastest_mps = 0.0;
+    for (double s = 0.0; s <= climb.duration_s(); s += 0.01) {
+      fastest_mps = std::max(fastest_mps, climb.at_s(s).v_W.norm());
+      EXPECT_LT(climb.at_s(s).a_W.norm(), 1.5001);
+    }
+    EXPECT_LT(climb.at_s(climb.duration_s()).v_W.norm(), 1e-6);
+    // 6 m at 1.5 m/s, and a second to speed up and to slow down.
+    EXPECT_LT(climb.duration_s(), from_m > 0.0 ? 0.01 : 5.3);
+    EXPECT_NEAR(fastest_mps, from_m > 0.0 ? 0.0 : 1.5, 1e-6);
+  }
+}
+
 TEST(FlightControl, LeadsAnAutopilotThatComesBackMovingToAStopAndNotBack) {
   LedFlight f;
   f.tell(AutopilotStage::kReady, false, false);

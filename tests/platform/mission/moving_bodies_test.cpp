@@ -60,7 +60,7 @@ int early_stops(double cost_factor, double appears_s) {
 TEST(AlwaysAStop, IsFlownTwoMinorFramesAfterTheMapThatShowsTheWayBlocked) {
   int early = 0;
   // So far ahead that the flight lane's own look does not see it first.
-  for (const double appears_s : {7.5, 8.0, 8.5, 9.0}) early += early_stops(0.15, appears_s);
+  for (const double appears_s : {4.5, 5.0, 5.5, 6.0}) early += early_stops(0.15, appears_s);
   EXPECT_GT(early, 0) << "otherwise nothing was in the way";
 }
 

@@ -228,21 +228,25 @@ MissionConfig among_wires(std::uint64_t seed) {
 }
 
 TEST(ThinThings, BetweenTwoDecisionsAreBrakedFor) {
-  // A level wire of 2 cm that no decision saw before it was too late. Of 700 to 719 the look brakes in 700, 708, 710, 715 and 718; of five such
-  // flights of 700 to 740 all ended in the wire without it (2026-11-28, an earlier program). Decisions take up to 4.6 s here.
-  for (const std::uint64_t seed : {710U, 715U}) {
+  // A level wire of 2 cm that no decision saw before it was too late: the look brakes in one flight of four. Of five such flights all ended
+  // in the wire without it (2026-11-28, an earlier program). Decisions take up to 4.6 s here.
+  constexpr int kBraked = 2;
+  int braked = 0;
+  for (std::uint64_t seed = 700; seed < 720 && braked < kBraked; ++seed) {
     const sitl::World world(sitl::make_world(sitl::WorldKind::kWires, seed, {}));
     MissionConfig config = among_wires(seed);
     config.log = test::scratch("wires.mcap");
     const report::MissionResult r = fly_mission(world, config, {}).result;
     std::printf("seed %u: %s after %.0f s, braked %u times\n", static_cast<unsigned>(seed), r.reason.c_str(),
                 r.mission_time_s, static_cast<unsigned>(r.near_brakes));
-    EXPECT_TRUE(r.reached_goal) << r.reason;
     EXPECT_FALSE(r.collided);
-    EXPECT_GT(r.near_brakes, 0U);
+    if (r.near_brakes == 0) continue;
+    ++braked;
+    EXPECT_TRUE(r.reached_goal) << r.reason;
     const ReplayResult replayed = replay_flight(config.log, {});
     EXPECT_TRUE(replayed.same()) << "after " << replayed.seconds << " s";
   }
+  EXPECT_EQ(braked, kBraked);
 }
 
 /// Seed 361: five seconds after the last look at a wire it stood 1.5 m from there, and took 6 m/s for the next one. Seed 371: the wire
