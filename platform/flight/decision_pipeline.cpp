@@ -135,8 +135,8 @@ void DecisionPipeline::perceive(const DecisionInput& in, DecisionOutput& out) no
   bodies_.observe(in.now, in.p_WB, motion_.appeared_W(), error);
   bodies_.follow(in.now, in.p_WB, cloud_.points());
   out.motion = motion_.startled(in.now) || bodies_.near(in.now, in.p_WB, in.v_WB, MotionWatch::kReach_m);
-  // Where views leave gaps a coarse cell is rarely seen whole: in such cells nothing were visible, the governor would hurry,
-  // choose coarser ones, and see as little again.
+  // Coarse cells are rarely seen whole, nor is the vehicle's own free among trunks: in such cells nothing were visible, the governor
+  // would hurry, choose coarser ones, and see as little again.
   const stages::FinestView finest(map_.view());
   (void)profile_space(profiler, cloud_.points(), finest, *in.committed, in.now, in.p_WB, in.v_WB, in.goal_W,
                       relevant_W, is_narrow_ ? slow_radius_m(config_.vehicle) : r_m, out.profile, budget,
