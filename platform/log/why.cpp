@@ -12,7 +12,7 @@ namespace {
 std::string words_of_source(std::string_view source) {
   if (source == "trajectory") return "the trajectory being flown: nowhere along it may the time run out";
   if (source == "visibility") return "how far ahead it can see, with no trajectory to follow";
-  if (source == "shortest") return "the shortest decision there is: physics would allow even less";
+  if (source == "shortest") return "the shortest decision that is of use: physics would allow even less";
   if (source == "longest") return "usefulness: physics would allow more, but the decision is done by then";
   if (source == "failures")
     return "failed decisions before it: precision first, so it gets what the finer cells take";

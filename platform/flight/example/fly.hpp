@@ -17,7 +17,7 @@ inline int fly(const roborun::board::OwnParts& own) {
     world.bounds_W = {Vector3(-10, -15, 1.5), Vector3(70, 15, 8)};
     world.start_W = Vector3(0, 0, 4);
     world.goal_W = Vector3(60, 0, 4);
-    world.pillars = {{20, 1, 2}, {40, 2, 2}};
+    world.pillars = {{20, 1, 2}, {40, -2, 2}};
 
     roborun::mission::MissionConfig config;
     // What computing costs in virtual time: the authors' machine, which charges by volume, whatever computes.
